@@ -6,13 +6,12 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from test_execute import digests, run
+from test_execute import run
 
-from mdr_dask import bootstrap, execute, fits, store
+from mdr_dask import bootstrap, fits, store
 from mdr_dask.campaign import Replication, Tolerance, loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, FitError
-from mdr_dask.execute import Part, Resources
 from mdr_dask.fits.base import Fit
 
 TEXT = """
@@ -91,33 +90,6 @@ def test_only_rows_and_columns_that_a_constant_follows_from_go_on(own, url):
     result = _level({"": store.datasets(url)[""].load()})
     half = (result.level_high - result.level_low) / 2
     assert (half <= np.maximum(0.25, 0.2 * abs(result.level))).all()
-
-
-@pytest.mark.slow
-def test_interrupted_runs_and_parts_end_with_the_same_bytes(own, toy, tmp_path):
-    campaign = own(Tolerance(absolute=0.2))
-    whole, broken, parts = (str(tmp_path / name) for name in ("a.zarr", "b.zarr", "c.zarr"))
-    run(campaign, whole)
-    blocks = 0
-
-    def stop(progress):
-        nonlocal blocks
-        blocks += 1
-        if blocks in (2, 5, 9):
-            raise KeyboardInterrupt
-
-    for _ in range(5):
-        try:
-            execute.run(campaign, broken, Resources(threads=1), stop)
-        except KeyboardInterrupt:
-            continue
-    for _ in range(6):
-        for number in (1, 2):
-            run(campaign, parts, part=Part(number, 2))
-    run(campaign, parts)
-    assert blocks > 9
-    assert digests(whole) == digests(broken) == digests(parts)
-    assert run(campaign, whole).done == 0
 
 
 def test_a_study_in_a_larger_store_is_judged_by_its_own_cases_and_lines(own, toy, tmp_path):

@@ -13,17 +13,12 @@ from benchmarks import __main__ as command
 from benchmarks import accuracy, campaigns, high_speed, peers
 from benchmarks.peers.friction import stepped
 from benchmarks.rows import read
-from benchmarks.runner import compare, kills
+from benchmarks.runner import compare
 from benchmarks.solvers import SOLVERS, sliding
 from benchmarks.surfaces import persson, road, validity
 
 #: Random cases of each family; more where a case takes milliseconds.
 CASES = {"wear": 2, "velocity jump": 2, "breakthrough of one revolution": 1, "transforms": 20, "levels of a jump": 20}
-
-
-def test_all_kinds_exist():
-    for module, _ in command.KINDS.values():
-        assert callable(importlib.import_module(module).main)
 
 
 def test_every_command_that_is_named_exists():
@@ -96,14 +91,6 @@ def test_the_runner_ends_with_the_numbers_of_a_loop_after_a_kill(tmp_path):
     compare.Trial("bare loop", tmp_path / "warm", 2).watched()
     _, ours = compare.compare(tmp_path, 2000, ["mdr_dask"])
     assert ours[-1] == "yes", ours
-
-
-@pytest.mark.slow
-def test_parts_that_are_killed_end_with_the_same_bytes(capsys):
-    kills.main("2", "3")
-    found = capsys.readouterr().out
-    assert "the same bytes" in found
-    assert "verify: 0 faults" in found
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """The command line: exit codes, streams, tables, JSON, and runs that are killed."""
 
-import csv
-import io
 import json
 import os
 import re
@@ -74,12 +72,6 @@ def test_run_then_run_again(campaign, capsys):
     assert (counts["store"], counts["kept"], counts["done"]) == ("results/small.zarr", 64, 0)
 
 
-def test_dry_run_prints_the_plan_and_writes_nothing(campaign, capsys):
-    assert main(["run", str(campaign), "--dry-run"]) == 0
-    assert "8 cases x 8 realisations = 64 results" in capsys.readouterr().out
-    assert not Path("results").exists()
-
-
 def test_dry_run_prints_the_range_of_rounds(campaign, capsys):
     until = "realisations: {at_least: 8, at_most: 24, until: {friction_coefficient: 1 %}}"
     campaign.write_text(CAMPAIGN.replace("realisations: 8", until))
@@ -122,18 +114,6 @@ def test_problems_of_a_file_go_to_stderr_with_exit_code_2(campaign, capsys):
     assert f"{campaign}:7:" in streams.err
     assert f"{campaign}:8:" in streams.err
     assert not Path("results").exists()
-
-
-def test_show_selects_with_units_and_prints_csv_and_json(filled, capsys):
-    arguments = ["show", filled, "friction_coefficient", "--select", "normal_force=100 mN"]
-    assert main([*arguments, "--select", "velocity=5 mm/s..1 km/s", "--csv"]) == 0
-    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
-    assert [float(row["velocity [m/s]"]) for row in rows] == pytest.approx([0.01, 0.1, 1.0])
-    assert main([*arguments, "--json", "--statistic", "mean"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["units"]["normal_force"] == "N"
-    means = xr.open_zarr(filled).friction_coefficient.sel(normal_force=0.1).mean("realisation")
-    np.testing.assert_allclose([row["friction_coefficient_mean"] for row in document["rows"]], means, rtol=1e-12)
 
 
 def test_status_counts_and_lists_failures(filled, capsys):

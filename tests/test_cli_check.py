@@ -164,18 +164,6 @@ def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, 
         assert f"  {line}\n" in printed
 
 
-def test_a_file_of_a_list_that_is_not_there_is_one_problem(tmp_path, capsys):
-    path = tmp_path / "lost.yaml"
-    path.write_text(
-        "name: lost\nmodel: sliding_friction\nparameters:\n  length: 1 mm\n  points: 200\n"
-        "  surface: {map: {files: [nowhere.npy], spacing: 2 um, unit: m}}\n"
-        "  shear_modulus: 2 MPa\n  relaxation_time: 1 ms\n  normal_force: 1 N\n  velocity: 1 m/s\n"
-    )
-    assert main(["check", str(path)]) == 2
-    (problem,) = capsys.readouterr().err.splitlines()
-    assert "parameters.surface.map.files[0]: no such file: " in problem
-
-
 def test_check_names_the_defaults_that_have_an_effect(capsys):
     Path("gear.yaml").write_text(
         "name: gear\nmodel: mixed_lubrication\nparameters:\n  normal_force: 500 N\n  rotation_speed: 100 rpm\n"

@@ -12,7 +12,7 @@ import pytest
 
 import mdr_dask
 from mdr_dask import __version__, plots
-from mdr_dask.cli import cli, main
+from mdr_dask.cli import main
 from mdr_dask.plots.base import Plot
 from mdr_dask.store import datasets
 
@@ -164,13 +164,6 @@ def test_a_warning_is_printed_once_for_all_figures(filled, capsys, monkeypatch):
     assert f"all figures: warning: the film is thin (2 results of {filled})" in errors
     assert sum("warning: the load is high" in line for line in errors) == 1
     assert "warning: the film is thin" in Path("drawn/small-force.csv").read_text()
-
-
-@pytest.mark.parametrize("command", ["plot", "fit", "sensitivity", "master-curve", "surface"])
-def test_commands_that_draw_have_the_same_options(command):
-    options = {name for option in cli.commands[command].params for name in option.opts}
-    assert {"--size", "--title", "--style"} <= options
-    assert "--plot" in options or command == "plot"
 
 
 def test_the_look_of_a_figure_needs_a_figure(filled, capsys):

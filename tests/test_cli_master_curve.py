@@ -49,22 +49,6 @@ def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, con
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["nowhere.csv"], "nowhere.csv: no such table or store"),
-        ([str(TABLE), "--plot", "figure.xyz"], "ends in .png, .pdf or .svg, got 'figure.xyz'"),
-        ([str(TABLE), "-o", "factors.txt"], "ends in .json or .csv, got 'factors.txt'"),
-        ([str(TABLE), "--reference", "500"], "got 500"),
-    ],
-)
-def test_impossible_options_are_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, options, message):
-    monkeypatch.chdir(tmp_path)
-    assert main(["master-curve", *options]) == 2
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_factors_and_merged_curve_are_written_and_kept_results_are_recognised(tmp_path, capsys):
     factors, curve, kept = tmp_path / "new" / "factors.csv", tmp_path / "curve.csv", tmp_path / "kept.json"
     assert main(["master-curve", str(TABLE), "-o", str(kept)]) == 0

@@ -1,12 +1,9 @@
 """Errors of outputs, from the campaign file through the store to aggregates and the command line."""
 
-import json
-
 import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask import store
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError
@@ -66,17 +63,3 @@ def test_rounds_go_by_outputs_and_not_by_their_errors(toy):
     text = STUDY.replace("6", "{at_most: 20, until: {width_error: 1 %}}")
     with pytest.raises(CampaignError, match="this is none of the outputs of the campaign"):
         loads(text, "a.yaml", ".")
-
-
-def test_show_distinguishes_scatter_and_grid_error(filled, capsys):
-    assert main(["show", filled, "width"]) == 0
-    note, *_, units, first, last = capsys.readouterr().out.splitlines()
-    assert note.startswith("mean +- standard error +- grid error; in all rows: realisations = 6")
-    assert units.split() == ["position", "[m]", "width", "[m]"]
-    assert [line.count("+-") for line in (first, last)] == [2, 2]
-    assert main(["show", filled, "width", "--json"]) == 0
-    row = json.loads(capsys.readouterr().out)["rows"][0]
-    opened = store.datasets(filled)[""].isel(position=0)
-    assert row["width_mean"] == pytest.approx(float(opened.width.mean()))
-    assert row["width_grid_error"] == pytest.approx(float(opened.width_error.mean()))
-    assert row["width_standard_error"] == pytest.approx(float(opened.width.std(ddof=1)) / 6**0.5)

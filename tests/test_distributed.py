@@ -32,9 +32,6 @@ def run_on(resources, campaign, url):
     return execute.run(campaign, url, resources, lambda _: None)
 
 
-TWO = Replication(2, 2, {})
-
-
 @pytest.mark.slow
 def test_a_lost_worker_fails_nothing(toy, url, tmp_path, workers):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]), dies_once=str(tmp_path / "died"))

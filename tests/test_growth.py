@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from test_execute import digests, run, values
 
 from mdr_dask import execute, store
-from mdr_dask.campaign import Replication, Tolerance, loads
+from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Progress, Resources
 from mdr_dask.models.base import Status
@@ -265,40 +265,3 @@ StoreAgainstDict.TestCase.settings = settings(
     max_examples=12, stateful_step_count=8, deadline=None, suppress_health_check=list(HealthCheck)
 )
 TestStoreAgainstDict = pytest.mark.slow(StoreAgainstDict.TestCase)
-
-
-STRUCTURED = """
-name: shapes
-model: sliding_friction
-seed: 1
-realisations: 2
-parameters:
-  length: 20 mm
-  points: 200
-  hurst: 0.7
-  rms_roughness: 0.5 um
-  shear_modulus: 10 MPa
-  relaxation_time: 1 ms
-  normal_force: 0.1 N
-  velocity: [1 mm/s, 1 m/s]
-  indenter:
-    values: [INDENTERS]
-outputs: [friction_coefficient]
-"""
-
-
-def test_structured_values_left_out_of_the_file_are_restored_from_the_store(url):
-    def shapes(*indenters):
-        return loads(STRUCTURED.replace("INDENTERS", ", ".join(indenters)), "shapes.yaml", ".")
-
-    plane, cone, parabola = "{shape: plane}", "{shape: cone, angle: 10 deg}", "{shape: parabola, radius: 10 mm}"
-    run(shapes(plane, cone), url)
-    before = values(url, "friction_coefficient")
-    assert run(shapes(plane, cone), url).done == 0
-    progress = run(shapes(parabola), url)
-    assert (progress.kept, progress.done + progress.failed) == (0, 4)
-    assert run(shapes(cone, plane), url).kept == 8
-    after = values(url, "friction_coefficient")
-    assert after.sizes["indenter"] == 3
-    np.testing.assert_array_equal(after[:, :2], before)
-    assert len(set(after.indenter.to_numpy().tolist())) == 3

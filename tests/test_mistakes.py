@@ -4,7 +4,6 @@ import pytest
 
 from mdr_dask.campaign import load, loads
 from mdr_dask.errors import CampaignError
-from mdr_dask.plan import estimate
 from mdr_dask.units import COMMON, is_unit
 
 CAMPAIGN = """\
@@ -92,14 +91,6 @@ def test_numbers_in_quotes_are_numbers_everywhere():
 def test_marks_of_other_editors_do_not_matter(text, tmp_path):
     (tmp_path / "study.yaml").write_bytes(text.encode())
     assert load(tmp_path / "study.yaml").series == loads(CAMPAIGN, "study.yaml", ".").series
-
-
-def test_a_study_that_is_too_large_is_told_by_its_sizes():
-    text = CAMPAIGN.replace("[0.1 N, 1 N]", "{linear: [1 N, 2 N, 100000]}").replace("1 m/s, 4]", "1 m/s, 10000]")
-    with pytest.raises(
-        CampaignError, match=r"at most 1e\+09 results, got 100000 normal_force x 10000 velocity x 2 real"
-    ):
-        estimate(loads(text, "study.yaml", "."))
 
 
 @pytest.mark.parametrize("unit", COMMON.split())

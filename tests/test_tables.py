@@ -70,22 +70,10 @@ WRONG = {
     "nothing": ("", "1:1: expected a line of names and at least one line of values"),
     "comments only": ("# f\n", "1:1: expected a line of names and at least one line of values"),
     "names only": ("f [Hz],E' [Pa]\n", "1:1: expected a line of names and at least one line of values"),
-    "no unit": (
-        "f [Hz],E'\n1,2\n",
-        "1:8: $expected its unit, such as 'storage modulus [MPa]' in the first line",
-    ),
-    "capitals of a unit": (
-        "f [Hz],E' [mpa]\n1,2\n",
-        "1:8: $unknown unit 'mpa' (did you mean 'MPa'?)",
-    ),
-    "unit of another kind": (
-        "f [Hz],E' [mm]\n1,2\n",
-        "1:8: $expected a pressure (such as '10 MPa')",
-    ),
-    "dimension on a number": (
-        "f [Hz],E' [Pa],tan delta [MPa]\n1,2,3\n",
-        "1:16: column tan delta: expected a number",
-    ),
+    "no unit": ("f [Hz],E'\n1,2\n", "1:8: $expected its unit, such as 'storage modulus [MPa]' in the first line"),
+    "capitals of a unit": ("f [Hz],E' [mpa]\n1,2\n", "1:8: $unknown unit 'mpa' (did you mean 'MPa'?)"),
+    "unit of another kind": ("f [Hz],E' [mm]\n1,2\n", "1:8: $expected a pressure (such as '10 MPa')"),
+    "dimension on a number": ("f [Hz],E' [Pa],tan delta [MPa]\n1,2,3\n", "1:16: column tan delta: expected a number"),
     "unknown column": (
         "f [Hz],storage modulos [Pa]\n1,2\n",
         "1:8: unknown column 'storage modulos' (did you mean 'storage modulus'?)",
@@ -99,10 +87,7 @@ WRONG = {
     "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3:3: $expected a number, got 'high'"),
     "empty": ("f [Hz],E' [Pa]\n1,2\n3,\n", "3:3: $expected a number, got ''"),
     "nan": ("f [Hz],E' [Pa]\n1,nan\n3,4\n", "2:3: $expected a number, got 'nan'"),
-    "negative": (
-        "f [Hz],E' [MPa]\n1,2\n3,-4\n",
-        "3:3: $expected a value above 0, got '-4 MPa'",
-    ),
+    "negative": ("f [Hz],E' [MPa]\n1,2\n3,-4\n", "3:3: $expected a value above 0, got '-4 MPa'"),
     "below absolute zero": (
         "f [Hz],E' [Pa],T [C]\n1,2,-300\n",
         "2:5: column temperature: expected a value above -273.15 degC, got '-300 degC'",
@@ -113,10 +98,7 @@ WRONG = {
         "2:1: expected 2 values as in line 1, got 3 (put semicolons between the values if they have decimal commas)",
     ),
     "no names": ("1,2,3,4,5\n1,2,3,4,5\n", "1:1: expected the names of the 5 columns in the first line"),
-    "long cell": (
-        "f [Hz],E' [Pa]\n1," + "9" * 200_000 + "\n",
-        "2:3: $expected a number",
-    ),
+    "long cell": ("f [Hz],E' [Pa]\n1," + "9" * 200_000 + "\n", "2:3: $expected a number"),
 }
 
 

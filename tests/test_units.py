@@ -14,7 +14,7 @@ from mdr_dask import models
 from mdr_dask.campaign.reference import output_rows, parameter_rows
 from mdr_dask.errors import did_you_mean, distinguishable
 from mdr_dask.questions.selection import written_apart
-from mdr_dask.units import expected, is_doubtful, likely, seconds, shown, shown_apart, to_si
+from mdr_dask.units import expected, is_doubtful, likely, shown, shown_apart, to_si
 
 
 @pytest.mark.parametrize(
@@ -126,21 +126,6 @@ def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
     with pytest.raises(ValueError, match="expected"):
         to_si(value, "m")
     assert time.process_time() - began < 1
-
-
-@pytest.mark.parametrize(
-    ("duration", "text"),
-    [
-        (0.123, "0.12 s"),
-        (9.96, "10 s"),
-        (60.0, "1 min 0 s"),
-        (601.0, "10 min"),
-        (3600.0, "1 h 0 min"),
-        (90000.0, "25 h 0 min"),
-    ],
-)
-def test_durations_for_a_reader(duration, text):
-    assert seconds(duration) == text
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import model_validator
 
@@ -18,7 +18,6 @@ from mdr_dask.errors import CampaignError
 from mdr_dask.models.base import Parameters, quantity
 
 HEAD = "name: a\nmodel: rubbing\nparameters:\n  length: 20 mm\n"
-LOADED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=50)
 
 
 def read(parameters="  normal_force: 1 N\n", rest=""):
@@ -160,35 +159,6 @@ def test_whole_ranges_are_strictly_monotonic(low, high, count, geometric):
     assert (values[0], values[-1]) == (low, high)
     assert all((b - a) * (high - low) > 0 for a, b in pairwise(values))
     assert len(values) <= min(count, abs(high - low) + 1)
-
-
-@LOADED
-@given(
-    st.lists(st.integers(1, 10**6), min_size=1, max_size=5, unique=True),
-    st.lists(st.integers(0, 10), min_size=1, max_size=5, unique=True),
-    st.integers(2, 6),
-)
-def test_a_grid_has_one_dimension_for_each_axis(forces, tenths, count):
-    parameters = (
-        f"  normal_force: [{', '.join(f'{force} kN' for force in forces)}]\n"
-        f"  hurst: [{', '.join(f'{tenth / 10}' for tenth in tenths)}]\n"
-        f"  velocity: {{geometric: [1 mm/s, 1 m/s, {count}]}}\n"
-    )
-    [series] = read(parameters).series
-    assert series.sizes == {"normal_force": len(forces), "hurst": len(tenths), "velocity": count}
-    assert series.axes[0].values == tuple(1000.0 * force for force in forces)
-    first = {axis.path: axis.values[0] for axis in series.axes}
-    assert {path: getattr(series.parameters, path) for path in first} == first
-
-
-@LOADED
-@given(finite, st.sampled_from([("N", 1.0), ("mN", 1e-3), ("kN", 1e3), ("uN", 1e-6)]))
-def test_a_unit_string_means_the_same_as_its_number_in_si(value, unit):
-    name, factor = unit
-    [written] = read(f"  velocity: 1 nm/s\n  normal_force: {value!r} {name}\n").series
-    assert written.parameters.normal_force == pytest.approx(value * factor, rel=4e-16)
-    [plain] = read(f"  velocity: 1e-9\n  normal_force: {written.parameters.normal_force!r}\n").series
-    assert plain == written
 
 
 class Free(Parameters):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from mdr_dask.campaign import loads
-from mdr_dask.campaign.definition import Spread
 from mdr_dask.errors import CampaignError
 
 HEAD = "name: a\nmodel: rubbing\nparameters:\n  length: 20 mm\n"
@@ -90,18 +89,6 @@ def test_a_column_within_a_parameter_says_what_the_file_lacks(tmp_path, column, 
         read("", "sampling: {table: cases.csv}\n", tmp_path)
 
 
-@pytest.mark.parametrize(("low", "high"), [(2.0, 50.0), (50.0, 2.0)])
-@pytest.mark.parametrize("geometric", [False, True])
-def test_shares_of_an_interval_lead_to_its_values_and_back(low, high, geometric):
-    spread = Spread(low, high, geometric, whole=False)
-    shares = np.array([0.0, 0.25, 0.8, 1.0])
-    values = spread.at(shares)
-    assert values[0] == low
-    assert values[-1] == high
-    assert values[1] == pytest.approx(low * (high / low) ** 0.25 if geometric else low + 0.25 * (high - low))
-    assert np.allclose(spread.shares(values), shares, atol=1e-12)
-
-
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
 def test_a_table_of_cases_is_read_like_any_other(encoding, tmp_path):
     text = "Plan of \u00b5 tests\nnormal_force;velocity;Pr\u00fcfer\n[N];[mm/s];\n1;100;a\n5;500,5;b\n20;9000\n"
@@ -109,9 +96,3 @@ def test_a_table_of_cases_is_read_like_any_other(encoding, tmp_path):
     campaign = loads(HEAD + "sampling: {table: plan.csv}\n", "a.yaml", str(tmp_path))
     assert values(campaign.series[0], "velocity") == (0.1, 0.5005, 9.0)
     assert campaign.remarks == ("table plan.csv: not used: Pr\u00fcfer",)
-
-
-def test_a_table_of_cases_has_one_kind_of_decimals(tmp_path):
-    (tmp_path / "plan.csv").write_text("normal_force [N];velocity [mm/s]\n1;0,5\n5;1.000\n")
-    with pytest.raises(CampaignError, match="remove the separators of thousands"):
-        loads(HEAD + "sampling: {table: plan.csv}\n", "a.yaml", str(tmp_path))

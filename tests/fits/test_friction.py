@@ -9,7 +9,6 @@ from mdr_dask.fits.indenter import within_indenter_law
 from mdr_dask.physics.sliding import laws
 
 FIT = {name: fit.compute for name, fit in available("sliding_friction").items()}
-ZONE_ONE = available("sliding_friction")["zone_one"]
 
 
 @pytest.fixture(scope="module")
@@ -39,49 +38,12 @@ def test_the_interpolation_law_holds_as_stated(forces):
     assert np.all(found["rms_error_stated"] < 0.16)  # 11 % for long lines, and the scatter of 12 short lines
 
 
-@pytest.mark.slow
-def test_constants_of_the_interpolation_law_are_those_of_zone_one():
-    axes = {
-        "hurst": [0.2, 0.5, 0.8],
-        "normal_force": np.geomspace(1e-3, 1e2, 16),
-        "velocity": np.geomspace(1e-5, 1e2, 15),
-    }
-    data = store(axes, realisations=60, points=5000, oversampling=4)
-    zone, whole = (FIT[name]({"": data}) for name in ("zone_one", "interpolation"))
-    np.testing.assert_allclose(whole["alpha"], zone["alpha"], atol=0.06)
-    np.testing.assert_allclose(whole["beta"], zone["beta"], rtol=0.1)
-    assert np.all(whole["rms_error_stated"] < 0.11)
-
-
 def test_plateau_lies_near_root_two(forces):
     found = FIT["plateau"]({"": forces})
     assert found["plateau"].dims == ("hurst", "normal_force")
     high = found.isel(normal_force=slice(10, 13))
     assert np.all(high["reached"].str.startswith("yes"))
     assert high["plateau"].sel(hurst=0.7).values == pytest.approx(np.sqrt(2), rel=0.15)
-
-
-CURVES = {
-    "rises": lambda x: np.exp(0.3 * x),
-    "falls": lambda x: np.exp(-0.3 * x),
-    "levels off": lambda x: 1.0 + np.tanh(0.8 * x),
-    "has a top": lambda x: np.exp(-0.5 * (x - 0.7) ** 2),
-    "has a top at its end": lambda x: np.exp(-0.02 * (x - 3.9) ** 2),
-    "has its top beyond": lambda x: np.exp(-0.05 * (x - 5.5) ** 2),
-}
-
-
-@pytest.mark.parametrize("lines", [1, 9])
-@pytest.mark.parametrize("curve", CURVES)
-def test_the_top_of_a_mirrored_curve_is_the_mirrored_top(curve, lines):
-    chance = np.random.default_rng(5)
-    x = np.linspace(-4.0, 4.0, 15) + chance.uniform(-0.1, 0.1, 15)
-    stack = bootstrap.means(CURVES[curve](x) * (1 + 0.03 * chance.standard_normal((lines, 15))))
-    # one line has no resamples; rows shifted by errors are not mirrored
-    rows = slice(1 if lines == 1 else 1 + bootstrap.RESAMPLES)
-    here, there = top.highest(x, stack, lines), top.highest(-x[::-1], stack[:, ::-1], lines)
-    for one, other, sign in zip(here, there, (1, -1, -1), strict=True):
-        np.testing.assert_allclose(other[rows], sign * one[rows], rtol=1e-6, atol=1e-9)
 
 
 def test_a_failed_line_of_three_leaves_a_plateau():

@@ -196,13 +196,6 @@ def test_a_plateau_that_is_not_reached_has_no_interval(lines, law, end):
     assert np.all(np.isfinite(found["plateau"]))
 
 
-def test_an_indenter_without_a_case_within_the_law_has_no_exponent():
-    steep = planted({**CONE, "indenter_angle": 0.5}, 5, 1, **CASES["indenter"].outputs).isel(study=0)
-    found = FIT["indenter"].compute({"": steep})
-    assert found["law_holds"].item().startswith("not tested: the law applies to 0 of 9 cases, three are needed")
-    assert np.isnan(found["exponent"])
-
-
 @pytest.mark.parametrize("law", [zone, WRONG["bent"].outputs["friction_coefficient"]])
 def test_one_line_alone_has_no_interval_and_no_verdict(law):
     found = FIT["zone_one"].compute({"": planted(ZONE, 1, 1, (0.0, 0.0), friction_coefficient=law)}).squeeze()

@@ -119,42 +119,6 @@ def test_constant_and_limits_of_the_jump(lines: int) -> None:
     assert coverage(found, "zeta", np.mean(jump_law(before, 0.42) / before)) >= LEAST
 
 
-def stated(data: xr.Dataset, grid: float) -> xr.Dataset:
-    """Return studies in which all coefficients of friction have the relative error that the store states."""
-    for name in ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after"):
-        data[f"{name}_error"] = grid * np.abs(data[name])
-        data[name] = ((1 + grid) * data[name]).assign_attrs(ancillary_variables=f"{name}_error")
-    return data
-
-
-@LINES
-def test_a_stated_error_of_the_grid_is_part_of_the_interval(lines: int) -> None:
-    found = FIT["kinetics"].compute({"": stated(studies(np.array([0.01]), 60, lines), 0.2)})
-    assert coverage(found, "jump_over_slope", JUMP / CHANGE) >= LEAST
-    assert coverage(found, "before_over_slope", BEFORE) >= LEAST
-    law = of_each_store(stated(studies(np.geomspace(1e-4, 1, 6), 30, lines), 0.1))
-    assert coverage(law, "constant", 0.42) >= LEAST
-    assert judged(law, "no:") == 0
-
-
-@LINES
-def test_a_stated_error_of_the_trace_is_part_of_the_interval(lines: int) -> None:
-    """A part of the trace has an error of 4 % of mu - mu_2, and mu_2, which is subtracted, has an error, too."""
-    data = studies(np.array([0.05]), 60, lines)
-    after = data["friction_coefficient_after"]
-    start = data["friction_coefficient_before"] + data["friction_coefficient_jump"] - after
-    wrong = start * 0.1 * RATE * data["relaxation_times"] * np.exp(-RATE * data["relaxation_times"])
-    data["friction_coefficient_after_error"] = 0.1 * after
-    data["friction_coefficient_after"] = after.assign_attrs(ancillary_variables="friction_coefficient_after_error")
-    data["friction_coefficient_error"] = 0.1 * after + np.abs(wrong)
-    trace = (data["friction_coefficient"] + wrong).transpose(*data["friction_coefficient"].dims)
-    data["friction_coefficient"] = trace.assign_attrs(ancillary_variables="friction_coefficient_error")
-    found = FIT["relaxation"].compute({"": data})
-    for name, truth in (("rate", RATE), ("integral_rate", 0.98 * RATE)):
-        assert coverage(found, name, truth) >= LEAST
-    assert judged(found, "no:") == 0
-
-
 @LINES
 def test_jumps_by_another_law_are_named(lines: int) -> None:
     """The planted jumps are proportional to the square of mu_1."""
@@ -164,32 +128,3 @@ def test_jumps_by_another_law_are_named(lines: int) -> None:
     assert found["law_holds"].item().startswith("no: departs by")
     assert found["constant_high"] / found["constant_low"] > 3
     assert found["zeta_holds"].item().startswith("no: departs by")
-
-
-@LINES
-@pytest.mark.parametrize("same", [True, False])
-def test_rates_with_a_step_are_named(lines: int, same: bool) -> None:
-    """The rates have a step by a factor of three; all lines have the same rates, or each line has its own."""
-    data = studies(np.geomspace(1e-3, 1, 6), 2, lines, power=0.3)
-    late = data["relaxation_times"] * 3.0
-    fast = data["friction_coefficient"].interp(relaxation_times=np.clip(late, TIMES[0], TIMES[-1]))
-    both = xr.where(data["velocity"] > 0.03, fast.assign_coords(relaxation_times=TIMES), data["friction_coefficient"])
-    data = data.assign(friction_coefficient=both.transpose(*data["friction_coefficient"].dims))
-    if same:
-        data = data.map(lambda values: values.mean("realisation").broadcast_like(values) if values.ndim > 1 else values)
-    found = FIT["rate_power"].compute({"": data}).sel(regime="above").isel(normal_force=0)
-    assert not found["fitted_law_holds"].item().startswith("yes")
-    if np.isfinite(found["power"]):
-        assert found["power_high"] - found["power_low"] > 0.1
-
-
-@LINES
-def test_two_exponentials_are_not_one(lines: int) -> None:
-    data = studies(np.array([0.05]), 3, lines)
-    run = RATE * data["relaxation_times"]
-    start = data["friction_coefficient_before"] + data["friction_coefficient_jump"] - data["friction_coefficient_after"]
-    trace = data["friction_coefficient_after"] + start * (0.6 * np.exp(-0.3 * run) + 0.4 * np.exp(-10 * run))
-    data["friction_coefficient"] = trace.transpose(*data["friction_coefficient"].dims)
-    found = FIT["relaxation"].compute({"": data})
-    assert judged(found, "yes") == 0
-    assert np.all(found["rate_high"] / found["rate_low"] > 1.3)

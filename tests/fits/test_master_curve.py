@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fits.curve_tables import clusters, column_of, curves_of, finite_rows, kind_of, read_table
+from mdr_dask.fits.curve_tables import clusters, column_of, curves_of, finite_rows, read_table
 from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, rereferenced
 
 DATA = Path(__file__).parents[1] / "data" / "dma"
@@ -55,10 +55,7 @@ def test_friction_of_a_smooth_body_is_taken_off():
     bulk = 0.1 * smooth["velocity"] ** 0.3 * xr.ones_like(smooth["friction_coefficient"])
     rough["friction_coefficient"] = rough["friction_coefficient"] + bulk
     smooth["friction_coefficient"] = bulk
-    series = {
-        "rough": rough.assign_coords(rms_roughness=1e-5),
-        "smooth": smooth.assign_coords(rms_roughness=0.0),
-    }
+    series = {"rough": rough.assign_coords(rms_roughness=1e-5), "smooth": smooth.assign_coords(rms_roughness=0.0)}
     (fit,) = FITS
     assert float(fit.compute(series)["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
     assert fit.compute(dict(reversed(series.items()))).equals(fit.compute(series))
@@ -69,14 +66,6 @@ def test_friction_of_a_smooth_body_is_taken_off():
 def test_store_without_the_axes_is_refused():
     with pytest.raises(DataError, match="roughness that varies normal_force and velocity"):
         FITS[0].compute({"": store().isel(velocity=0)})
-
-
-def test_units_of_a_study_stay_with_its_means():
-    study = store().rename(friction_coefficient="tangential_force")
-    study["tangential_force"].attrs["units"] = "N"
-    study["velocity"].attrs["units"] = "m/s"
-    curve = master_curve(study, "velocity", "tangential_force", "normal_force")
-    assert [curve[f"curve_{name}"].attrs["units"] for name in ("abscissa", "ordinate")] == ["m/s", "N"]
 
 
 def test_frame_of_columns_with_other_names():
@@ -102,21 +91,6 @@ def test_measured_moduli_with_a_row_of_units_and_scattering_temperatures():
     assert master_curve(kept, "f", "E_stor", "T", "none").attrs["companion"] == ""
 
 
-def wlf_table(seed, reference=0.0):
-    """Storage modulus with one percent of scatter; WLF with c1 8.86 and c2 101.6 K at 0 degC."""
-    random, times = np.random.default_rng(seed), np.logspace(-8, 4, 25)
-    parts = 6.6e7 * np.exp(-0.5 * ((np.log10(times) + 8) / 2.2) ** 2) + 3e5 * (times > 1e-6)
-    rows = []
-    for celsius in (-20.0, -10, 0, 20, 40):
-        x = np.geomspace(0.63, 314, 12)[:, None] * 10 ** (-8.86 * celsius / (101.6 + celsius)) * times
-        modulus = 1.2e6 + np.sum(parts * x**2 / (1 + x**2), axis=1)
-        for w, m in zip(np.geomspace(0.63, 314, 12), modulus, strict=True):
-            rows.append((w, m * (1 + 0.01 * random.standard_normal()), celsius))
-    table = pd.DataFrame(rows, columns=["frequency", "modulus", "temperature"])
-    table.attrs["units"] = {"frequency": "rad/s", "modulus": "Pa", "temperature": "degC"}
-    return table
-
-
 def moduli_of_a_rubber(readings):
     """Return G' and G'' of one relaxation spectrum, shifted; readings scatter about the temperatures."""
     rows = []
@@ -128,12 +102,6 @@ def moduli_of_a_rubber(readings):
     return rows
 
 
-@pytest.mark.parametrize("names", [("Kreisfrequenz", "Speicher", "Verlust", "Temperatur"), ("f", "G'", "G''", "T")])
-def test_moduli_are_recognised_by_their_units(names):
-    units = dict(zip(names, ("rad/s", "Pa", "Pa", "degC"), strict=True))
-    assert kind_of(names[0], names[1:3], names[3], units) == "modulus"
-
-
 def test_rounded_readings_of_one_sweep_are_one_temperature():
     table = pd.DataFrame(moduli_of_a_rubber([0.1, 0.0, -0.1, 0.0]), columns=["f", "G'", "G''", "T"])
     curve = master_curve(table)
@@ -143,23 +111,6 @@ def test_rounded_readings_of_one_sweep_are_one_temperature():
     sweep = np.tile(np.geomspace(1, 10, 6), 5)
     assert np.unique(clusters(set_values, sweep)).size == 5
     assert np.unique(clusters(np.sort(set_values), np.arange(30.0))).size == 5
-
-
-def test_wlf_constants_do_not_depend_on_whether_the_reference_was_measured():
-    curve = master_curve(wlf_table(5), vertical="none")
-    found = {at: rereferenced(curve, at) for at in (-20.0, -3.3, 0.0, 10.0, 25.0, 40.0)}
-    found[25.5] = master_curve(wlf_table(5), vertical="none", reference=25.5)
-    products = [float(each["wlf_c1"] * each["wlf_c2"]) for each in found.values()]
-    ends = [at - float(each["wlf_c2"]) for at, each in found.items()]
-    np.testing.assert_allclose(products, products[0], rtol=1e-6)
-    np.testing.assert_allclose(ends, ends[0], rtol=1e-6)
-    assert len({float(each["arrhenius_activation_energy"]) for each in found.values()}) == 1
-    between = found[25.0]
-    assert between["wlf_c2_low"] < 126.6 < between["wlf_c2_high"]
-    assert between["wlf_c1_low"] < 8.86 * 101.6 / 126.6 < between["wlf_c1_high"]
-    truth = -8.86 * between["temperature"] / (101.6 + between["temperature"]) + 8.86 * 25 / 126.6
-    half = (between["shift_factor_high"] - between["shift_factor_low"]) / 2
-    assert np.all(np.abs(between["shift_factor"] - truth) < 2 * half)
 
 
 def test_saved_curves_can_be_rereferenced(tmp_path):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from fit_studies import SLOPE, coverage, judged, not_contradicted, planted
 from friction_store import store
 
@@ -155,20 +154,6 @@ def test_the_plateau_is_compared_with_both_slopes():
     assert str(without["law_holds"].values.flat[0]).startswith("not tested: the study has no output contact_slope")
 
 
-@pytest.mark.parametrize("lines", [2, 5, 40])
-def test_a_rising_curve_with_scatter_has_no_plateau(lines):
-    axes, rng = {"normal_force": [0.1], "velocity": np.geomspace(1e-3, 1, 9)}, np.random.default_rng(5)
-    data = planted(axes, lines, 1, friction_coefficient=lambda force, v: v**0.1 + 0 * force).isel(study=0)
-    shape = data.friction_coefficient.shape
-    verdicts = []
-    for scatter in (0.1, 0.3):
-        for _ in range(4):
-            noisy = data.friction_coefficient * (1 + scatter * rng.standard_normal(shape))
-            found = available("sliding_friction")["plateau"].compute({"": data.assign(friction_coefficient=noisy)})
-            verdicts.append(str(found["reached"].values.flat[0]))
-    assert sum(each.startswith("yes") for each in verdicts) <= 1, verdicts
-
-
 def test_too_few_points_do_not_test_a_collapse():
     """With more constants than points, any curves collapse. A load without a curve has NaN."""
     axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(1e-2, 10, 4), "velocity": np.geomspace(1e-6, 1, 5)}
@@ -179,22 +164,3 @@ def test_too_few_points_do_not_test_a_collapse():
     assert found["force_number"].notnull().all()
     assert found["fitted_law_holds"].str.startswith("not tested: ").all()
     assert found["horizontal_low"].isnull().all()
-
-
-@pytest.mark.slow
-def test_shifting_never_increases_the_spread():
-    """For steep curves of few points, undamped Newton steps would give three times the distances before shifting."""
-    axes = {"normal_force": np.geomspace(1e-3, 1e2, 5), "velocity": np.geomspace(1e-8, 1e2, 12)}
-    data = planted(axes, 3, 3, friction_coefficient=lambda force, v: (v / force) ** 2 / (1e-9 + (v / force) ** 3))
-    found = FIT["collapse"].compute({"": data})
-    assert (found["rms_error"] <= found["rms_before"]).all()
-
-
-def test_an_error_as_large_as_the_mean():
-    """An infinite error counts as 100 % of the mean."""
-    data = planted(LOADS, 5, 1, contact_fraction=lambda force, _: 0.3 * force**0.6).isel(study=0)
-    data["contact_fraction"].attrs["ancillary_variables"] = "contact_fraction_error"
-    for error in (3 * data.contact_fraction, xr.full_like(data.contact_fraction, np.inf)):
-        found = FIT["contact_growth"].compute({"": data.assign(contact_fraction_error=error)})
-        assert found["exponent_high"] - found["exponent_low"] > 0.1
-        assert np.isfinite(found["factor_low"])

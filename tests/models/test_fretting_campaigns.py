@@ -98,30 +98,6 @@ def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_sti
     assert " 6 solves (91.7% of the results" in streams.err
 
 
-@pytest.mark.slow
-def test_sliding_from_a_campaign(write):
-    path = write(
-        "  indenter: [{shape: parabola}, {shape: cone}]\n  hold: [depth, force]\n  path: [0, 1, 40]\n",
-        "accuracy: 1e-4\n"
-        "outputs: [contact_radius, wear_volume, contact_force, worn_profile, worn_image, pressure, worn_depth, "
-        "block_depth, stick_border]\n",
-    )
-    data = filled(path).isel(realisation=0)
-    assert np.all(data.status == 1)
-    depth = data.sel(hold="depth", path=40.0)
-    np.testing.assert_allclose(depth.contact_radius, [np.sqrt(2), np.pi / 2], atol=1e-5)
-    np.testing.assert_allclose(depth.wear_volume, [np.pi, np.pi**3 / 12], atol=1e-4)
-    force = data.sel(hold="force")
-    virgin = force.contact_force.isel(path=0, drop=True)
-    np.testing.assert_allclose(force.contact_force / virgin, 1.0, rtol=1e-4)
-    np.testing.assert_allclose(
-        force.wear_volume / virgin, (0 * virgin + force.path).transpose(*force.wear_volume.dims), rtol=3e-4, atol=1e-12
-    )
-    assert np.all(np.diff(force.block_depth.isel(block=0).transpose("indenter", "path")) > 0)
-    assert np.all(data.stick_border == 0)
-    assert np.all(data.wear_volume_error <= 3e-3 * data.wear_volume + 1e-6)
-
-
 def test_sliding_in_physical_units_obeys_the_wear_law(write):
     kept = [
         line for line in STEEL.splitlines() if line.split(":")[0].strip() not in {"effective_shear_modulus", "friction"}
@@ -189,43 +165,6 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
     assert "wear.yaml:4:34: parameters.indenter.file: profile.csv:" in error
     assert message in error
     assert len(error.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [
-        ("radius,height [um]", "profile.csv:1:1: column radius: expected its unit, such as 'radius [mm]'"),
-        ("radius [mm],height [s]", "profile.csv:1:13: column height: "),
-        ("radius [mm],hight [um]", "profile.csv:1:13: unknown column 'hight' (did you mean 'height'?)"),
-        ("radius [mm],radius [mm]", "profile.csv:1:13: column radius is given twice"),
-    ],
-)
-def test_columns_of_a_profile_need_their_names_and_units(write, capsys, names, message):
-    """Any header was skipped, and every number taken in metres."""
-    path = write(TABLE)
-    Path("profile.csv").write_text(f"{names}\n0,0\n1e-1,1\n2e-1,2\n1,1e3\n")
-    assert main(["check", str(path)]) == 2
-    error = capsys.readouterr().err
-    assert "wear.yaml:4:34: parameters.indenter.file: profile.csv:1:" in error
-    assert message in error
-    assert len(error.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("shape", "message"),
-    [
-        ("", "expected indenter: {shape: power} in the campaign file"),
-        ("  indenter: {shape: cone}\n", "expected indenter: {shape: power} in the campaign file"),
-    ],
-)
-def test_a_column_of_one_shape_says_which_shape_the_file_lacks(write, capsys, shape, message):
-    """It was "no such parameter (did you mean 'indenter'?)"."""
-    path = write(f"  stick_radius: 0.5\n{shape}", "sampling: {table: cases.csv}\n")
-    Path("cases.csv").write_text("indenter.exponent,cycles\n1.5,1\n3,2\n")
-    assert main(["check", str(path)]) == 2
-    assert capsys.readouterr().err == f"cases.csv:1:1: indenter.exponent: {message}\n"
-    path = write("  stick_radius: 0.5\n  indenter: {shape: power}\n", "sampling: {table: cases.csv}\n")
-    assert main(["check", str(path)]) == 0
 
 
 @pytest.mark.parametrize(

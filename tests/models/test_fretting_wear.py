@@ -59,30 +59,6 @@ def test_dimensional_case_is_the_dimensionless_one_in_its_units():
     assert result.values["stick_border"][0, 0] == pytest.approx(c * a0, rel=1e-10)
 
 
-@pytest.mark.parametrize("wear_rule", ["fast", "exact"])
-def test_bitwise_independent_of_the_block(wear_rule):
-    columns = {"stick_radius": np.array([0.3, 0.3, 0.6, 0.6]), "cycles": np.array([0.7, 3.0, 0.7, 5.0])}
-    parameters = FrettingWear(stick_radius=0.3, wear_rule=wear_rule, amplitude_scatter=0.05)
-    block = Block(parameters, columns, 4, (0, 5), 7, SCALARS)
-    whole = MODEL.compute(block)
-    for case in range(4):
-        for position, realisation in enumerate((0, 5)):
-            part = MODEL.compute(block.part(case, realisation))
-            for name in SCALARS:
-                assert part.values[name][0, 0] == whole.values[name][case, position], (name, case)
-
-
-def test_a_case_that_misses_its_accuracy_is_solved_as_if_it_were_alone():
-    """How finely it was solved again followed the worst of its block: the radius after few cycles was 2e-5 off."""
-    parameters, cycles = FrettingWear(indenter=Cone(shape="cone"), stick_radius=0.2), np.array([0.5, 2.0, 8.0, 30.0])
-
-    def radii(some):
-        block = Block(parameters, {"cycles": some}, some.size, (0,), 1, ("contact_radius",), 1e-3)
-        return MODEL.compute(block).values["contact_radius"][:, 0]
-
-    assert radii(cycles).tolist() == [float(radii(each)[0]) for each in np.split(cycles, cycles.size)]
-
-
 def test_scatter_has_the_asked_width_and_leaves_the_mean():
     parameters = FrettingWear(wear_rule="fast", stick_radius=0.455, cycles=0.01, wear_coefficient_scatter=0.3)
     volume = run(parameters, realisations=tuple(range(4000))).values["wear_volume"][0]
@@ -101,15 +77,6 @@ def test_scatter_of_friction_and_of_the_amplitude_moves_the_border_of_stick(sour
     # 5 standard errors of 4000 samples
     assert np.std(factor) == pytest.approx(0.02, rel=5 / np.sqrt(8000))
     assert np.mean(factor) == pytest.approx(1.0, abs=5 * 0.02 / np.sqrt(4000))
-
-
-def test_gross_slip_is_a_message_and_nothing_else_fails():
-    result = run(FrettingWear(**STEEL), {"amplitude": np.array([1e-6, 1e-4])})
-    assert result.status.ravel().tolist() == [Status.DONE, Status.FAILED]
-    assert "gross slip" in result.messages[1, 0]
-    assert all(name in result.messages[1, 0] for name in ("normal_force", "path", "history"))
-    assert np.isnan(result.values["wear_volume"][1, 0])
-    assert np.isfinite(result.values["wear_volume"][0, 0])
 
 
 def test_constant_force():
@@ -189,12 +156,6 @@ def test_table_of_a_ball(tmp_path):
     smooth = run(FrettingWear(**{**STEEL, "normal_force": None, "depth": 4.7e-6}))
     for name in ("wear_volume", "contact_radius", "contact_force"):
         assert measured.values[name][0, 0] == pytest.approx(smooth.values[name][0, 0], rel=1e-5)
-
-
-def test_contact_beyond_the_table(tmp_path):
-    result = table_case(table(tmp_path, [(0.0, 0.0), (1e-6, 1e-10), (2e-6, 4e-10), (3e-6, 9e-10)]), (0, 1))
-    assert result.status.tolist() == [[Status.FAILED] * 2]
-    assert all("beyond the table" in result.messages[0, position] for position in (0, 1))
 
 
 @pytest.mark.parametrize(

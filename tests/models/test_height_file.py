@@ -154,13 +154,7 @@ SCANS = {
 }
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        None,
-        -9999.0,
-    ],
-)
+@pytest.mark.parametrize("code", [None, -9999.0])
 @pytest.mark.parametrize("layout", SCANS)
 def test_a_scan_is_read_as_it_stands_and_codes_are_no_heights(layout, code, tmp_path):
     text, units = SCANS[layout]

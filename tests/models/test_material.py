@@ -141,18 +141,6 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
     np.testing.assert_allclose(close.moduli, solid.moduli, rtol=1e-6, atol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("f [Hz],G' [MPa]\n1,2\n", "expected a column 'loss modulus' or 'tan delta'"),
-        ("T [C],f [Hz],G' [MPa],G'' [MPa]\n20,1,2,\n", r"dma.csv:2:8: column loss modulus: expected a number"),
-    ],
-)
-def test_a_table_that_is_no_dma_is_refused(tmp_path, text, message):
-    with pytest.raises(DataError, match=message):
-        moduli(tmp_path, text)
-
-
 #: Curves of one solid at several temperatures, shifted by the law of Williams, Landel and Ferry and divided by b_T.
 LAW = {"c1": 10.0, "c2": 100.0, "reference": 300.0}
 
@@ -209,15 +197,6 @@ def test_moduli_of_a_table_are_proportional_to_density_times_temperature(tmp_pat
     assert abs(complex_modulus(solid_of(plain), 1.0) / complex_modulus(solid_of(warm), 1.0) - 1) > 0.01
     shifted = material(dma_table={"file": file, "reference": 300.0})
     np.testing.assert_allclose(complex_modulus(solid_of(shifted), omega), 1e6 * (1 + (1j * omega) ** 0.3), rtol=0.05)
-
-
-def test_a_table_moves_from_its_own_temperature(tmp_path):
-    """The reference of the law is that of its constants, not the temperature of the table."""
-    file = shifted_table(tmp_path / "dma.csv", (300.0, 330.0))
-    own = {"file": file, "table_temperature": 330.0}
-    at_table = solid_of(material(dma_table=own))
-    same = solid_of(material(dma_table=own, temperature=330.0, wlf=LAW))
-    np.testing.assert_allclose(same.times, at_table.times, rtol=1e-12)
 
 
 def test_curves_with_a_gap_are_refused_before_any_is_shifted(tmp_path):

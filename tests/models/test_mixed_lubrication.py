@@ -49,16 +49,6 @@ def refused(**changes):
     return error["msg"]
 
 
-def test_every_output_has_the_declared_shape_and_no_gaps():
-    result = MODEL.compute(block(realisations=(0, 1), slide_roll_ratio=0.1))
-    sizes = {name: c.values.size for name, c in MODEL.coordinates(block().parameters).items()}
-    assert set(result.values) == set(MODEL.with_companions(ALL))
-    for output in (*MODEL.outputs, *MODEL.companions.values()):
-        assert result.values[output.name].shape == (1, 2, *(sizes[dim] for dim in output.dims))
-        assert np.all(np.isfinite(result.values[output.name])), output.name
-    assert np.all(result.status == Status.DONE)
-
-
 def test_trace_agrees_with_its_mean():
     """With as many angles as points, mean and fraction of the trace are the scalar outputs."""
     values = MODEL.compute(block(trace_points=20_000)).values
@@ -99,16 +89,6 @@ def test_an_automatic_number_of_points_meets_the_accuracy_or_warns():
     )
 
 
-@pytest.mark.slow
-def test_pieces_shorter_than_the_spacing_are_judged_right():
-    """20 000 points are 16 um apart, 15 times the longest piece in contact; 1 280 000 points resolve it."""
-    rollers = {"roller_radius": 0.05, "layer_thickness": 1e-10, "shortest_wavelength": 5e-5}
-    coarse, fine = (MODEL.compute(block(points=points, **rollers)).values for points in (20_000, 1_280_000))
-    for name in ("breakthrough_probability", "contact_length"):
-        assert 0 < abs(coarse[name] - fine[name]) < 0.05 * fine[name]
-        assert abs(coarse[name] - fine[name]) <= coarse[f"{name}_error"] + fine[f"{name}_error"]
-
-
 def test_errors_of_the_film_are_those_of_its_solution():
     names = ["film", "film_ratio", "asperity_load_share", "friction_coefficient"]
     given = {"film_thickness": None, "slide_roll_ratio": 0.05, "rotation_speed": 100.0}
@@ -124,17 +104,6 @@ def test_errors_of_the_film_are_those_of_its_solution():
     thin = MODEL.compute(block(names, **given | {"film_thickness": thinner})).values
     for name in names:
         assert coarse[f"{name}_error"] == pytest.approx(abs(thin[name] - coarse[name]), rel=1e-6)
-
-
-def test_what_misses_the_accuracy_is_named():
-    asked = block(["breakthrough_probability", "film"])
-    assert not MODEL.compute(asked).messages
-    result = MODEL.compute(dataclasses.replace(asked, accuracy=1e-6))
-    error = result.values["breakthrough_probability_error"] / result.values["breakthrough_probability"]
-    assert result.messages[0, 0] == (
-        "an accuracy of 1e-06 is missed; estimated relative errors: "
-        f"breakthrough_probability {error[0, 0]:.2g} (increase points)"
-    )
 
 
 #: The thesis's rig, by its defaults.
@@ -277,14 +246,6 @@ def test_tables_without_valid_viscosities_are_refused(text, changes, message, tm
 )
 def test_bad_input_gives_one_error(changes, message):
     assert message in refused(**changes)
-
-
-def test_a_bad_case_among_good_ones_is_data():
-    result = MODEL.compute(block(columns={"temperature": [333.15, 293.15]}, realisations=(0, 1)))
-    assert result.status.tolist() == [[Status.DONE] * 2, [Status.FAILED] * 2]
-    assert np.isnan(result.values["film"][1]).all()
-    assert "got 293.15 K" in result.messages[1, 0]
-    assert "got 293.15 K" in result.messages[1, 1]
 
 
 def write_profile(path, spacing, heights):

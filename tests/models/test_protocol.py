@@ -40,16 +40,6 @@ def test_one_step_is_the_jump() -> None:
     assert np.allclose(step["indentation_depth"], jump["indentation_depth"], rtol=1e-3)
 
 
-def test_value_depends_on_the_case_alone() -> None:
-    whole = block({"velocity": np.array([0.01, 0.05])}, protocol=STEP)
-    together = compute(whole)
-    for j in range(whole.cases):
-        for r, realisation in enumerate(whole.realisations):
-            alone = compute(whole.part(j, realisation))
-            for name in EVERY:
-                assert np.array_equal(alone.values[name][0, 0], together.values[name][j, r], equal_nan=True)
-
-
 @pytest.mark.parametrize(
     "protocol",
     [
@@ -112,22 +102,6 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
     found = compute(block(indenter={"shape": "parabola", "radius": 1.0}, normal_force=1e3))
     assert np.all(found.status == Status.FAILED)
     assert all("leaves the line" in message for message in found.messages.values())
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"velocity": 1e3, "relaxation_times": (1e-4, 1e-3)},
-        {"normal_force": 1e6},
-        {"protocol": {"shape": "steps", "times": [0.0, 1e-3], "velocities": [0.0, -0.05]}},
-        {"protocol": {"shape": "steps", "times": [0.0], "velocities": [0.05], "forces": [100.0]}},
-    ],
-)
-def test_extremes_are_values_or_a_status(change: dict[str, object]) -> None:
-    found = compute(block(**({"protocol": STEP} | change)))
-    done = found.status == Status.DONE
-    assert np.all(np.isfinite(found.values["friction_coefficient"][done]))
-    assert all((j, r) in found.messages for j, r in np.argwhere(~done))
 
 
 @pytest.mark.parametrize(

@@ -24,17 +24,6 @@ def grid():
     return {"normal_force": force.ravel(), "velocity": velocity.ravel()}
 
 
-@pytest.mark.parametrize(("scheme", "oversampling"), [("hermite", 1), ("hermite", "auto"), ("backward_euler", 4)])
-def test_a_value_does_not_depend_on_its_neighbours(scheme, oversampling):
-    block = make(grid(), scheme=scheme, oversampling=oversampling, accuracy=0.1)
-    whole = MODEL.compute(block)
-    assert np.all(whole.status == Status.DONE)
-    for index in (0, 6, 15):
-        alone = MODEL.compute(block.part(index, 1))
-        for name in ALL:
-            assert alone.values[name][0, 0].tobytes() == whole.values[name][index, 1].tobytes()
-
-
 def test_equal_dimensionless_numbers_are_solved_once():
     # the same F_N / (G h L) and v tau / L, reached through different parameters
     block = make(
@@ -124,16 +113,6 @@ def test_finer_accuracy_takes_finer_grids_and_is_met():
         assert np.count_nonzero(errors[-1] > estimate) <= 4
     # half of the cases are in full contact, where the solution is exact on any grid
     assert np.max(errors[1]) < np.max(errors[0])
-
-
-def test_full_contact_is_exact_in_any_units():
-    # thesis eq. 3.14
-    result = MODEL.compute(make({"normal_force": [1e4, 1e5]}, oversampling=2))
-    slope = result.values["rms_slope"]
-    expected = 4 * 1e7 * 1e-3 * 0.1 * 0.02 * slope**2 / np.array([[1e4], [1e5]])
-    assert result.values["friction_coefficient"] == pytest.approx(expected, rel=1e-10)
-    assert result.values["contact_fraction"] == pytest.approx(np.ones((2, 2)))
-    assert result.values["contact_slope"] == pytest.approx(slope, rel=1e-10)
 
 
 def test_friction_below_zero_lies_within_an_error_that_is_not():

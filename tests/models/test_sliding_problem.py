@@ -98,20 +98,6 @@ def test_errors_are_computed_only_on_request():
     assert friction.tobytes() == with_errors.values["friction_coefficient"].tobytes()
 
 
-@pytest.mark.parametrize("solid", ["kelvin", "standard"])
-def test_the_message_names_the_outputs_that_miss_the_accuracy(solid):
-    light = {"normal_force": 1e-9} if solid == "kelvin" else {"normal_force": 1e-4}
-    asked = ("friction_coefficient", "contact_slope")
-    result = solved(GENERATED | SOLIDS[solid] | light, MODEL.with_companions(asked), accuracy=1e-11)
-    message = result.messages[0, 0]
-    assert result.status[0, 0] == Status.DONE
-    for name in asked:
-        relative = result.values[f"{name}_error"][0, 0] / result.values[name][0, 0]
-        assert f"{name} {relative:.2g}" in message
-    assert "indentation_depth" not in message
-    assert not solved(GENERATED | SOLIDS[solid], accuracy=0.05).messages
-
-
 @dataclass(frozen=True)
 class Wedge:
     """A wedge with a flat tip, as an example of a shape that a user defines; `flat` is half the width of the tip."""

@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mdr_dask.campaign import json_schema, load
+from mdr_dask.campaign import load
 from mdr_dask.errors import CampaignError, DataError
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.surface import Surface, lines_of, spectra_of
@@ -118,13 +117,6 @@ def test_a_mistake_is_one_message_with_its_place(tmp_path, old, new, message):
         load(tmp_path / "road.yaml")
     (problem,) = str(caught.value).splitlines()
     assert message in problem
-
-
-def test_the_schema_for_editors_takes_bare_names():
-    study, schema = {"name": "road", "model": "sliding_friction"}, json_schema()
-    jsonschema.validate(study | {"parameters": {"surface": {"spectrum": "a.csv"}}}, schema)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(study | {"parameters": {"surface": {"spectrum": 3}}}, schema)
 
 
 def test_a_band_ends_at_any_waves_of_the_spectrum_up_to_its_ends(tmp_path):

@@ -64,13 +64,7 @@ def test_forms_of_parts_and_wrong_units_are_questioned(form, micrometres, senten
     assert sentence in "".join(asked)
 
 
-@pytest.mark.parametrize(
-    "heading",
-    [
-        "E'",
-        "Tensile storage modulus",
-    ],
-)
+@pytest.mark.parametrize("heading", ["E'", "Tensile storage modulus"])
 def test_moduli_in_tension_are_never_those_of_shear(heading, tmp_path):
     unit = "" if "[" in heading else " [MPa]"
     (tmp_path / "dma.csv").write_text(f"f [Hz],{heading}{unit},tan delta\n1,9,0.1\n10,12,0.1\n100,15,0.1\n")

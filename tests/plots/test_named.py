@@ -161,13 +161,6 @@ def test_a_jump_is_a_history_of_one_step(stores):
     np.testing.assert_allclose(one.column("y")[:3], [before, before, at_once])
 
 
-def test_a_figure_with_a_fault_says_so(tmp_path, monkeypatch):
-    groups = planted.make(tmp_path, planted.SLIDING + F + V)
-    monkeypatch.setattr("mdr_dask.plots.view.labels.named", lambda *_: 1 / 0)
-    with pytest.raises(DataError, match="internal error in this figure"):
-        available("sliding_friction")["velocity"].describe(groups)
-
-
 def test_a_master_curve_has_the_units_of_the_other_figures(stores):
     groups = stores(planted.SLIDING + F.replace("10 mN, 1 N, 100 N", "10 mN, 1000 mN, 100000 mN") + V)
     known = available("sliding_friction")

@@ -16,7 +16,7 @@ from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import curves, page
-from mdr_dask.plots.labels import chosen_units, short, symbols
+from mdr_dask.plots.labels import chosen_units, symbols
 from mdr_dask.plots.labels import label as axis_label
 from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw, figure_of
@@ -81,13 +81,6 @@ def test_units_have_readable_prefixes(tmp_path):
     figure = described(planted.make(tmp_path, text), "contact_fraction", "rms_roughness")
     assert figure.panels[0].x.label == "rms height $h$ [nm]"
     np.testing.assert_allclose(np.unique(rows(figure).x), [200, 500])
-
-
-@pytest.mark.parametrize(
-    ("number", "text"), [(10000, "10000"), (0.00012345, "0.0001234"), (1e-5, "1e-05"), (1e12, "1e+12")]
-)
-def test_numbers_in_legends_are_short(number, text):
-    assert short(number) == text
 
 
 @pytest.mark.parametrize(

@@ -72,13 +72,6 @@ def test_several_selections_hold_together(study):
     xr.testing.assert_identical(kept, study.isel(velocity=[3], temperature=[0, 2]))
 
 
-def test_a_value_between_two_takes_the_nearest_and_says_so(study):
-    told = []
-    kept = select(study, ["velocity=0.2 m/s"], told.append)
-    assert kept.velocity == 0.1
-    assert told == ["velocity: 0.2 m/s is not a value of this axis; the nearest value is used: 0.1 m/s"]
-
-
 @pytest.mark.parametrize(("factor", "kept"), [(1 + 5e-6, True), (1 + 2e-5, False)])
 def test_an_end_of_an_axis_is_its_own_but_for_rounding(study, factor, kept):
     """By a hundred thousandth of the largest value, whatever its unit."""

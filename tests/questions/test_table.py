@@ -136,13 +136,6 @@ def test_orders_put_what_is_not_there_last(study, limit, most, monkeypatch):
     assert found["velocity"][3] == 1.0
 
 
-def test_an_order_of_all_rows_comes_in_frames(study, monkeypatch):
-    monkeypatch.setattr(room, "ROWS", 5)
-    frames = list(table(study, Question(sort=("velocity",)), tell=silent).frames)
-    assert [len(frame) for frame in frames] == [5, 5, 2]
-    assert pd.concat(frames)["velocity"].is_monotonic_increasing
-
-
 def test_arrays_are_made_piece_by_piece(study, monkeypatch):
     question = Question(columns=("load_number",), outputs=("friction_coefficient",), where="velocity < 0.5")
     plain = labelled(study, question)
@@ -218,15 +211,6 @@ def test_boxes_follow_the_rows_whatever_their_size(study, most, monkeypatch):
     monkeypatch.setattr(room, "ROWS", most)
     monkeypatch.setattr(room, "WHOLE", 0)
     pd.testing.assert_frame_equal(rows(study, limit=4).iloc[:4], rows(study.chunk(velocity=2)).iloc[:4])
-
-
-@pytest.mark.parametrize(("limit", "first"), [(0, 12), (3, 3), (12, 12), (13, 12)])
-def test_a_limit_makes_no_more_rows_than_it_needs(study, limit, first, monkeypatch):
-    """Without one, or with one that all rows meet, whole chunks are read at once."""
-    monkeypatch.setattr(room, "ROWS", 100)
-    for array in study.data_vars.values():
-        array.encoding["chunks"] = SHAPE
-    assert len(next(table(study, Question(), limit, silent).frames)) == first
 
 
 def test_a_study_of_one_case_and_no_axis(study):

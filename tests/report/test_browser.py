@@ -11,10 +11,7 @@ from report_stores import friction, hostile
 from mdr_dask import aggregation, store
 from mdr_dask.report import page, read_study
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(program() is None, reason="no Chromium (apt-get install chromium)"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(program() is None, reason="no Chromium (apt-get install chromium)")]
 VELOCITY = "report.figures.find((figure) => figure.spec.name === 'velocity')"
 
 

@@ -17,7 +17,6 @@ from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
 from mdr_dask.plots.page import with_labels
 from mdr_dask.report import cases, figures, page, read_study, words
-from mdr_dask.report import study as study_room
 
 #: Numbers of the page have nine digits.
 DIGITS = 6e-9
@@ -207,14 +206,6 @@ def test_what_cannot_be_reported_is_refused_and_nothing_is_written(url, argument
     assert main(["report", *(argument.format(url=url) for argument in arguments)]) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_an_error_beside_a_mean_of_zero_is_no_percentage(url):
-    (data,) = store.datasets(url).values()
-    noise = xr.zeros_like(data["friction_coefficient"].load()) + 1e-16 * np.array([1.0, -1.0, 2.0, -1.5])
-    (errors,) = study_room._errors("", data.assign(friction_coefficient=noise))
-    (row,) = [row for row in errors.rows if row[0] == "friction_coefficient"]
-    assert row[1] == row[2] == row[4] == "over 100 %"
 
 
 def test_errors_of_a_case_are_in_the_unit_of_its_value(url):

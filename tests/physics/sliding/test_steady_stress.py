@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from schemes import on_line, under_indenter
+from schemes import on_line
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
@@ -57,28 +57,6 @@ def test_any_case_is_solved(hurst, points, oversampling, deborah, load, height, 
     steepest = 1.5 * max(np.max(np.abs(slope)), np.max(np.abs(np.diff(h))) * h.size)
     assert steady.drag[0] / carried <= steepest * (1 + 1e-9)
     assert 0 <= steady.contact_fraction[0] <= 1 + 1e-9
-
-
-@settings(max_examples=25, deadline=None)
-@example(1.0, 0.0, -1.0, 10.0, -8.0, "hermite")
-@given(
-    exponent=st.floats(1, 6),
-    coefficient=st.floats(-3, 3),
-    roughness_height=st.floats(-12, -1),
-    deborah=exponents,
-    load=exponents,
-    scheme=st.sampled_from(SCHEMES),
-)
-def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, deborah, load, scheme):
-    amplitude, phase = roughness.amplitudes(32, 0.7), roughness.phases(0, 0, 32)
-    height, slope = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
-    numbers = (10**coefficient, exponent, np.array([10**deborah]), np.array([10**load]), scheme)
-    steady = under_indenter(height, slope, *numbers)
-    if steady.status[0] == Outcome.DEPTH_NOT_FOUND:
-        assert is_lost_in_rounding(load, deborah)
-        return
-    assert steady.status[0] in (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
-    assert np.isfinite(steady.drag[0]) == (steady.status[0] == Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

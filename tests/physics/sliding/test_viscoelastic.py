@@ -130,20 +130,6 @@ def test_energy_lost_is_the_work_of_friction():
     assert drag / 0.3 == pytest.approx(state.friction_coefficient, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("velocity", "force", "viscosity"), [(1e-9, 1.0, 0.0), (1e-3, 1e-4, 100.0), (1e-3, 1e4, 0.0), (1e3, 1e4, 100.0)]
-)
-def test_fifty_terms_over_twenty_decades(velocity, force, viscosity):
-    moduli = 10 ** np.random.default_rng(2).uniform(4, 9, 50)
-    height, spacing, _ = line(16)
-    solid = prony(1e6, moduli, np.geomspace(1e-12, 1e8, 50), viscosity)
-    state = material_on_line(height, spacing, solid, velocity, force)
-    assert state.status == Outcome.CONVERGED
-    assert state.sweeps <= 12
-    finer = material_on_line(*line(64)[:2], solid, velocity, force)
-    assert state.friction_coefficient == pytest.approx(finer.friction_coefficient, rel=2 * state.error)
-
-
 def parabola(velocity, radius, modulus, time, force):
     """Closed form: contact from -sqrt(d R) to the zero of w + v tau w' (physics of the smooth Kelvin parabola)."""
     deborah = velocity * time

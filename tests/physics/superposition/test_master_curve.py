@@ -92,14 +92,6 @@ def test_intervals_hold_the_planted_factors_of_melts_and_rubbers(channels):
     assert np.median(half) < (0.06 if channels == slice(2) else 0.13)
 
 
-def test_order_of_curves_and_points_does_not_matter():
-    groups, curves, _, _ = family(4)
-    backwards = [(x[::-1], y[::-1]) for x, y in curves[::-1]]
-    one, other = superpose(groups, curves), superpose(groups[::-1], backwards)
-    assert np.array_equal(one.horizontal, other.horizontal)
-    assert np.array_equal(one.draws, other.draws)
-
-
 def test_rereferencing_is_fitting_with_another_reference():
     groups, curves, _, _ = family(5)
     free = superpose(groups, curves)

@@ -7,8 +7,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding import problem
-from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.surfaces import shapes as indenter
 
 DEPTH, DRAG, LEADING, TRAILING = range(4)
@@ -25,19 +23,6 @@ def test_mapping_keeps_the_load_of_the_body(exponent):
     # the MDR rule itself: g(x) = |x| integral_0^|x| f'(r) / sqrt(x^2 - r^2) dr with f = r^n and r = x sin t
     abel, _ = quad(lambda t: exponent * np.sin(t) ** (exponent - 1), 0, np.pi / 2)
     assert indenter.mapped(exponent) == pytest.approx(abel, rel=1e-10)
-
-
-def test_a_parabola_agrees_with_its_quadratic():
-    radius, deborah, depth = 2.0, 0.3, 0.05
-    a, b = np.sqrt(depth * radius), -deborah + np.sqrt(deborah**2 + depth * radius)
-
-    def force(x):
-        return depth - x**2 / radius - deborah * 2 * x / radius
-
-    load = quad(force, -a, b)[0]
-    drag = quad(lambda x: -force(x) * 2 * x / radius, -a, b)[0]
-    found = solve(load, deborah, 1 / radius, 2.0)[:, 0]
-    assert found[:4] == pytest.approx([depth, drag, a, b], rel=1e-11)
 
 
 @pytest.mark.parametrize(("coefficient", "exponent"), SHAPES)
@@ -92,18 +77,6 @@ def test_a_contact_that_leaves_the_line_fails(scheme):
     zeros, load = np.zeros(200), np.array([0.005, 0.2, 2.0])
     steady = under_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
     assert steady.status.tolist() == [Outcome.CONVERGED, Outcome.OUTSIDE_LINE, Outcome.OUTSIDE_LINE]
-
-
-@pytest.mark.parametrize("deborah", [1e-6, 0.1])
-def test_the_closed_form_ends_where_an_edge_leaves_the_line(deborah):
-    """Its leading edge, which is the farther one, at half the line."""
-    loads = np.geomspace(0.02, 0.5, 200)
-    lead = solve(loads, np.full(200, deborah), 0.5, 2.0)[LEADING]
-    assert lead[0] < 0.49
-    assert np.any((lead > 0.5) & (lead < 0.51))
-    steady, _ = problem._closed_form(indenter.PowerLaw(0.5, 2.0), Cases(np.full(200, deborah), loads))
-    assert (steady.status == Outcome.OUTSIDE_LINE).tolist() == (lead > 0.5).tolist()
-    assert np.isnan(steady.drag).tolist() == (lead > 0.5).tolist()
 
 
 def test_low_velocity_gives_the_law():

@@ -67,14 +67,6 @@ def at_times(line: CubicLine, solid: Foundation, deborahs: tuple[float, float], 
     return found.drag[np.append(0, np.searchsorted(moments, TIMES))]
 
 
-def test_second_order_in_the_grid() -> None:
-    solid = SERIES
-    exact = at_times(periodic_line(*rough(40)), solid, (0.1, 0.12))
-    found = [np.max(np.abs(at_times(periodic_line(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
-    assert found[1] < 5e-4
-    assert found[1] < found[0] / 3**SECOND
-
-
 @pytest.mark.parametrize("change", [0.2, -0.2])
 def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     """The solver for one jump shares nothing with this one but the line; the immediate value at its own."""

@@ -134,16 +134,6 @@ def test_bad_numbers_are_a_status() -> None:
         assert solved(height, slope, load, deborahs, TIMES).outcome == Outcome.INVALID
 
 
-def test_march_ends_where_friction_stays_within_the_accuracy() -> None:
-    accuracy = 1e-3
-    height, slope = line()
-    deborahs = DEBORAH, 1.2 * DEBORAH
-    long = solved(height, slope, LOAD, deborahs, TIMES, 24)
-    short = solved(height, slope, LOAD, deborahs, TIMES, 24, accuracy)
-    assert 0 < short.moments <= long.moments
-    assert np.max(np.abs(short.trace - long.trace)) < accuracy * long.after
-
-
 def test_transient_within_the_accuracy_is_not_computed() -> None:
     height, slope = line()
     accuracy, skipped = 1e-2, 0

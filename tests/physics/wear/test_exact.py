@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 from references.literal_wear import literal
-from scipy.integrate import quad
 
-from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.mdr.transforms import gauss, power_factor
-from mdr_dask.physics.wear import evolution, rules
+from mdr_dask.physics.wear import rules
 from mdr_dask.physics.wear.exact import exact
-from mdr_dask.physics.wear.slip import partial_slip
 
 PARABOLA = PowerProfile(2.0)
 RADII = np.array([0.5, 0.7, 0.9, 1.0, 1.1])
@@ -35,20 +32,6 @@ def test_checked_figures_at_constant_depth():
     assert second.wear_volume == pytest.approx(0.872404, abs=4e-6)
     beyond = second.contact_radius * np.array([1.0 + 1e-9, 1.01, 1.1, 3.0])
     np.testing.assert_array_equal(second.height(beyond), PARABOLA.height(beyond))
-
-
-@pytest.mark.slow
-def test_the_edge_converges_to_the_checked_figure():
-    """The edge is the least determined quantity: shorter steps on panels graded deep into the edge, a table with -s."""
-    edges = []
-    for tolerance in (4e-5, 4e-6, 4e-7):
-        problem = partial_slip(PARABOLA, 0.455, graded_panels(6, 14, 5), 1.4)
-        moments = evolution.march(problem, 2.0, tolerance, 1e-4)
-        edges.append(problem.edge(evolution.at(problem, moments, 2.0, tolerance)[1].unknowns))
-        print(f"{tolerance:g} {len(moments)} {edges[-1]:.7f}")
-    gaps = np.abs(np.array(edges) - 1.133353)
-    assert np.all(np.diff(gaps) < 0.0)
-    assert gaps[-1] < 2e-6  # 1e-6 of the checked figure, 1e-6 of the steps
 
 
 @pytest.mark.slow
@@ -111,45 +94,6 @@ def test_stated_errors_cover_the_distance_from_a_finer_solution(worn):
         assert np.max(error) < 2e-2
 
 
-@pytest.mark.parametrize("constant_force", [False, True])
-def test_every_step_conserves_energy(constant_force):
-    """Volume from the worn depths of slip zone and annulus, against int 2 (d - g) y dx."""
-    problem, start = partial_slip(PARABOLA, 0.455, graded_panels(12, 8, 4), 3.0), None
-    if constant_force:
-        problem, start = problem.under_force()
-    moments = evolution.march(problem, 2.0, 2e-5, 1e-5, start)
-    energy = evolution.integral_along(moments, [problem.wear_rate(m.unknowns) for m in moments])
-    abscissa, weight = gauss(40)
-    whole = np.pi * problem.body.width * problem.eta
-    volumes = []
-    for moment in moments:
-        border, width, _ = problem.place(moment.unknowns)
-        slipping = width * (problem.panels.weights @ moment.accumulated)
-        stuck = max(border, 0.0) * float(weight @ problem.frozen_depth(moment.path, max(border, 0.0) * abscissa))
-        volumes.append(whole * (slipping + stuck))
-    np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
-    np.testing.assert_allclose(volumes, energy, atol=1e-5)  # accumulated over them
-
-
-def test_the_frozen_depth_is_the_integral_along_the_path():
-    """(2/pi) int arccos(b / r) dd over straight pieces of b^2 up to the moment at which the border passes r."""
-    problem = partial_slip(PARABOLA, 0.455, graded_panels(16, 4, 4), 3.0)
-    rng = np.random.default_rng(3)
-    path = np.cumsum(np.append([[0.0], [0.0]], rng.uniform(0.0, 0.02, (2, 12)) ** 2, axis=1), axis=1)
-    square, width = problem.body.square, problem.body.width
-    places = np.append(path[0, [3, 8, 12]], 0.5 * (path[0, 5] + path[0, 6]))
-    for q, found in zip(places, problem.frozen_depth(path, places), strict=True):
-        depth = np.interp(q, *path)
-
-        def angle(d, q=q):
-            return np.arccos(np.sqrt((square + width * np.interp(d, *path[::-1])) / (square + width * q)))
-
-        rise = 2.0 / np.pi * quad(angle, 0.0, depth, points=path[1][path[1] < depth], epsabs=1e-14)[0]
-        r = np.sqrt(square + width * q)
-        virgin = quad(lambda t, r=r: PARABOLA.rise(r * np.cos(t) - 0.455, 0.455), 0.0, np.arccos(0.455 / r))[0]
-        assert found == pytest.approx(rise - 2.0 / np.pi * virgin / problem.eta, abs=2e-5 * rise)
-
-
 @pytest.mark.parametrize(
     ("exponent", "c", "constant_force"),
     [(2.0, 0.455, True), (1.0, 0.368, True), (0.5, 0.3, True), (2.0, 0.455, False), (0.5, 0.3, False)],
@@ -185,18 +129,6 @@ def test_the_border_of_a_steep_body_leaves_its_first_place_with_the_first_wear()
     for worn in (little, more):
         without_wear = (0.2**40.0 + worn.depth - 1.0) ** (1.0 / 40.0)
         assert abs(worn.stick_border - without_wear) <= worn.error("stick_border", RADII) + 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("exponent", "c"),
-    [(1.0, 0.05), (1.0, 0.21), (0.5, 0.3), (3.0, 0.1), (2.0, 0.98), (8.0, 0.5), (0.3, 0.01), (2.0, 0.999)],
-)
-def test_extremes_reach_the_limit(exponent, c):
-    worn, limit = exact(PowerProfile(exponent), c, [60.0], accuracy=1e-3)[0], rules.limit(PowerProfile(exponent), c)
-    assert worn.contact_radius == pytest.approx(limit.contact_radius, abs=1e-3)
-    assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
-    assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=1.5e-2)
 
 
 def test_the_limit_under_force_has_no_pressure_outside_its_stick_zone():
@@ -283,10 +215,3 @@ def test_gross_slip_at_constant_depth_ends_in_the_free_body(exponent, radius, vo
     slid = 3.0 * (np.arange(2000) + 0.5) / 2000
     worn = early.height(slid) - slid**exponent / power_factor(exponent)
     assert early.wear_volume == pytest.approx(2.0 * np.pi * worn @ slid * 3.0 / 2000, abs=2e-4)  # the midpoint rule
-
-
-def test_gross_slip_at_constant_force_wears_force_times_path():
-    slid = exact(PARABOLA, 0.0, [3.0], constant_force=True, errors=False)[0]
-    assert slid.normal_force == pytest.approx(4 / 3, rel=1e-5)
-    assert slid.wear_volume == pytest.approx(4.0, rel=1e-3)
-    assert slid.depth > 1.0

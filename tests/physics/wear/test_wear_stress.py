@@ -92,17 +92,7 @@ def test_sliding(exponent, constant_force):
 
 @pytest.mark.parametrize(
     ("exponent", "c"),
-    [
-        (0.3, 0.98),
-        (0.5, 0.1),
-        (1.0, 0.05),
-        (2.0, 0.05),
-        (2.0, 0.99),
-        (3.0, 0.2),
-        (5.0, 0.4),
-        (8.0, 0.5),
-        (20.0, 0.99),
-    ],
+    [(0.3, 0.98), (0.5, 0.1), (1.0, 0.05), (2.0, 0.05), (2.0, 0.99), (3.0, 0.2), (5.0, 0.4), (8.0, 0.5), (20.0, 0.99)],
 )
 def test_constant_force(exponent, c):
     """Force and energy are kept, f rises only, depth and border stay below those of the end; c^n >= 0.0025."""
