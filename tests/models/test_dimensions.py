@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
+from test_extremes import BALL, FILM, JUMP, KELVIN, LINE, ROLLERS, WEAR
 
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status, unit_of
@@ -64,41 +65,10 @@ def scaled(parameters, factors):
     return parameters.model_copy(update=changes)
 
 
-KELVIN = {"shear_modulus": 1e7, "relaxation_time": 1e-3}
-LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7, "normal_force": 1.5, "velocity": 0.1}
 TERMS = {"material": {"prony": {"static_modulus": 1e7, "moduli": (1e7, 3e8), "times": (1e-2, 1e-4), "viscosity": 50.0}}}
-LAW = {"static_modulus": 3e6, "loss_modulus": 1e6, "frequency": 1e3, "exponent": 0.2, "lowest": 1.0, "highest": 1e5}
-JUMP = LINE | {"oversampling": 2, "relaxation_times": (0.0, 0.1, 1.0)}
-FRETTING = {
-    "contact_modulus": 115e9,
-    "effective_shear_modulus": 90e9,
-    "friction": 0.6,
-    "hardness": 2e9,
-    "wear_coefficient": 1e-4,
-    "amplitude": 5e-7,
-    "cycles": 2e4,
-    "points": 20,
-}
-BALL = {"indenter": {"shape": "parabola", "radius": 0.01}, "normal_force": 50.0}
-FILM = {
-    "radius": 0.01,
-    "line_load": 1e5,
-    "mean_velocity": 1.0,
-    "viscosity": 0.08,
-    "pressure_viscosity": 2e-8,
-    "slide_roll_ratio": 0.1,
-}
-ROLLERS = {
-    "rms_roughness": 2e-7,
-    "points": 20_000,
-    "roller_radius": 1e-3,
-    "normal_force": 100.0,
-    "rotation_speed": 10.0,
-    "temperature": 333.15,
-    "cutoff_force": 100.0,
-    "trace_points": 100,
-    "layer_thickness": 5e-9,
-}
+FRETTING = WEAR | {"points": 20}
+SLIDING_FILM = FILM | {"slide_roll_ratio": 0.1}
+LONG_ROLLERS = ROLLERS | {"points": 20_000, "trace_points": 100}
 #: Model, parameters, and the units that may be changed freely; one row for each solver.
 ROWS = {
     "friction": ("sliding_friction", LINE | KELVIN, FREE),
@@ -149,19 +119,19 @@ ROWS = {
         | {"path": 0.1},
         FREE,
     ),
-    "film": ("ehl_line", FILM | {"compressible": False}, FREE),
-    "film, compressible": ("ehl_line", FILM, AT_ONE_PRESSURE),
+    "film": ("ehl_line", SLIDING_FILM | {"compressible": False}, FREE),
+    "film, compressible": ("ehl_line", SLIDING_FILM, AT_ONE_PRESSURE),
     "film, starved, Eyring": (
         "ehl_line",
-        FILM | {"compressible": False, "inlet": -1.5, "shear_law": "eyring", "eyring_stress": 5e6},
+        SLIDING_FILM | {"compressible": False, "inlet": -1.5, "shear_law": "eyring", "eyring_stress": 5e6},
         FREE,
     ),
-    "film, Roelands": ("ehl_line", FILM | {"viscosity_law": "roelands"}, AT_ONE_PRESSURE),
-    "rollers": ("mixed_lubrication", ROLLERS | {"film_thickness": 4e-7}, AT_ONE_PRESSURE),
-    "rollers, slip, formula": ("mixed_lubrication", ROLLERS | {"slide_roll_ratio": 0.1}, AT_ONE_PRESSURE),
+    "film, Roelands": ("ehl_line", SLIDING_FILM | {"viscosity_law": "roelands"}, AT_ONE_PRESSURE),
+    "rollers": ("mixed_lubrication", LONG_ROLLERS | {"film_thickness": 4e-7}, AT_ONE_PRESSURE),
+    "rollers, slip, formula": ("mixed_lubrication", LONG_ROLLERS | {"slide_roll_ratio": 0.1}, AT_ONE_PRESSURE),
     "rollers, EHL, strong layer": (
         "mixed_lubrication",
-        ROLLERS | {"slide_roll_ratio": 0.05, "film_formula": "ehl", "layer_shear_strength": 1e6},
+        LONG_ROLLERS | {"slide_roll_ratio": 0.05, "film_formula": "ehl", "layer_shear_strength": 1e6},
         AT_ONE_PRESSURE,
     ),
 }
