@@ -4,14 +4,17 @@ import hashlib
 import importlib
 import os
 import pkgutil
+import shutil
 from pathlib import Path
 
 import hypothesis
 import pytest
 import threadpoolctl
 import toy as toy_model
+from small_campaign import CAMPAIGN
 
 import mdr_dask
+from mdr_dask.cli import main
 
 TESTS = Path(__file__).parent
 PHYSICS = Path(mdr_dask.__file__).parent / "physics"
@@ -79,3 +82,28 @@ def toy(monkeypatch):
 @pytest.fixture
 def url(tmp_path):
     return str(tmp_path / "study.zarr")
+
+
+@pytest.fixture
+def campaign(tmp_path, monkeypatch) -> Path:
+    """The file of the small campaign, in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "small.yaml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Path:
+    """The store of the small campaign."""
+    folder = tmp_path_factory.mktemp("small")
+    (folder / "small.yaml").write_text(CAMPAIGN)
+    assert main(["run", str(folder / "small.yaml"), "--quiet", "--store", str(folder / "small.zarr")]) == 0
+    return folder / "small.zarr"
+
+
+@pytest.fixture
+def filled(campaign, finished) -> str:
+    """A copy of the store of the small campaign."""
+    shutil.copytree(finished, "results/small.zarr")
+    return "results/small.zarr"

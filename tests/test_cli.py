@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,51 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from small_campaign import CAMPAIGN
 from test_execute import digests
 
 from mdr_dask.cli import main
 
 #: Seconds after which a process is not waited for, on a machine that may be busy.
 PATIENCE = 300
-CAMPAIGN = """\
-name: small
-model: sliding_friction
-seed: 7
-realisations: 8
-parameters:
-  length: 20 mm
-  points: 500
-  hurst: 0.7
-  rms_roughness: 0.5 um
-  shear_modulus: 10 MPa
-  relaxation_time: 1 ms
-  normal_force: [0.1 N, 10 N]
-  velocity: {geometric: [1 mm/s, 1 m/s, 4]}
-"""
-
-
-@pytest.fixture
-def campaign(tmp_path, monkeypatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "small.yaml"
-    path.write_text(CAMPAIGN)
-    return path
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory) -> Path:
-    """Return the store of a finished run."""
-    folder = tmp_path_factory.mktemp("cli")
-    (folder / "small.yaml").write_text(CAMPAIGN)
-    url = folder / "small.zarr"
-    assert main(["run", str(folder / "small.yaml"), "--quiet", "--store", str(url)]) == 0
-    return url
-
-
-@pytest.fixture
-def filled(campaign, finished) -> str:
-    shutil.copytree(finished, "results/small.zarr")
-    return "results/small.zarr"
 
 
 def test_run_then_run_again(campaign, capsys):
@@ -78,6 +39,7 @@ def test_dry_run_prints_the_range_of_rounds(campaign, capsys):
     assert main(["run", str(campaign), "--dry-run"]) == 0
     printed = capsys.readouterr().out
     assert "8 cases x 8 to 24 realisations = 64 to 192 results" in printed
+    assert not Path("results").exists()
     assert "64 to 192 different solutions to compute" in printed
     assert "from the first round to the last one" in printed
     assert main(["run", str(campaign), "--dry-run", "--json"]) == 0

@@ -1,61 +1,23 @@
 """Figures from the command line: what is drawn, left out and reported."""
 
 import hashlib
-import re
-import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
+from small_campaign import CAMPAIGN
+from test_own_model import CAMPAIGN as PIN
+from test_own_model import MODULE
 
 import mdr_dask
-from mdr_dask import __version__, plots
+from mdr_dask import plots
 from mdr_dask.cli import main
 from mdr_dask.plots.base import Plot
 from mdr_dask.store import datasets
 
-CAMPAIGN = """\
-name: small
-model: sliding_friction
-seed: 7
-realisations: 3
-parameters:
-  length: 20 mm
-  points: 200
-  hurst: 0.7
-  rms_roughness: 0.5 um
-  shear_modulus: 10 MPa
-  relaxation_time: 1 ms
-  normal_force: [0.1 N, 10 N]
-  velocity: {geometric: [1 mm/s, 10 m/s, 4]}
-"""
 #: Figures of four speeds and two loads; whether they can be merged into a master curve is tested elsewhere.
 HELD = {"velocity", "force", "contact_growth"}
-
-
-@pytest.fixture
-def campaign(tmp_path, monkeypatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "small.yaml"
-    path.write_text(CAMPAIGN)
-    return path
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory) -> Path:
-    """Return the store of a finished run."""
-    folder = tmp_path_factory.mktemp("figures")
-    (folder / "small.yaml").write_text(CAMPAIGN)
-    assert main(["run", str(folder / "small.yaml"), "--quiet", "--store", str(folder / "small.zarr")]) == 0
-    return folder / "small.zarr"
-
-
-@pytest.fixture
-def filled(campaign, finished) -> str:
-    shutil.copytree(finished, "results/small.zarr")
-    return "results/small.zarr"
 
 
 def test_all_draws_what_the_store_holds(filled, capsys):
@@ -79,8 +41,8 @@ def test_selected_values_are_stated(filled, capsys):
     assert "held fixed: " in Path("one.csv").read_text()
     assert "normal_force = 0.1 N" in Path("one.csv").read_text()
     map_of = ["plot", filled, "friction_coefficient", "--effects", "--title", "Mine", "-o", "two.png"]
-    assert main([*map_of, "--select", "velocity=10 m/s"]) == 0
-    assert "two.png: v = 10 m/s" in capsys.readouterr().err
+    assert main([*map_of, "--select", "velocity=1 m/s"]) == 0
+    assert "two.png: v = 1 m/s" in capsys.readouterr().err
     assert main(["plot", filled, "velocity", "--select", "normal_farce=1"]) == 2
     assert "did you mean 'normal_force'" in capsys.readouterr().err
     assert main(["plot", filled, "velocity", "--series", "nowhere"]) == 2
@@ -107,7 +69,9 @@ def test_an_error_in_one_figure_does_not_prevent_the_others(filled, capsys, monk
 
 def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, capsys):
     command = ["plot", filled, "friction_coefficient", "--over", "velocity", "--by", "normal_force"]
-    assert main([*command, "--units", "velocity=km/h", "--size", "85mm", "-o", "drawn/mu.pdf"]) == 0
+    units = ["--units", "velocity=km/h", "--units", "contact_fraction=%"]
+    assert main([*command, *units, "--size", "85mm", "-o", "drawn/mu.pdf"]) == 0
+    assert "--units contact_fraction: not shown in any figure that was drawn" in capsys.readouterr().err
     assert (Path("drawn") / "mu.pdf").read_bytes().startswith(b"%PDF")
     table = pd.read_csv("drawn/mu.csv", comment="#")
     data = table[table["what"] == "data"].set_index(["normal_force", "velocity"])
@@ -115,43 +79,28 @@ def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, c
     mean = study["friction_coefficient"].mean("realisation").to_series()
     np.testing.assert_allclose(data["y"].reindex(mean.index), mean)
     np.testing.assert_allclose(data["x"], 3.6 * data.index.get_level_values("velocity"))
-    assert np.all(data["y_low"] < data["y"])
-    assert np.all(data["y"] < data["y_high"])
-    assert set(table["what"]) == {"data", "law (eq. 3.18)"}
+    assert np.all((data["y_low"] < data["y"]) & (data["y"] < data["y_high"]))
     head = "".join(line for line in Path("drawn/mu.csv").read_text().splitlines(True) if line.startswith("#"))
     digest = hashlib.sha256(CAMPAIGN.encode()).hexdigest()
     for text in (
-        f"# mdr_dask: {__version__}, figure friction_coefficient-over-velocity",
         f"campaign small, sha256 {digest}, model sliding_friction",
-        f"# store {filled}:",
         f"# command: mdr-dask plot {filled} friction_coefficient --over velocity",
-        "hurst = 0.7",
-        "shear_modulus = 10000000 Pa",
         "# units: normal_force [N], velocity [m/s]",
-        "# panel 1: x: velocity v [km/h]; y: coefficient of friction",
     ):
         assert text in head
+    shown = mdr_dask.plot(filled, "friction_coefficient", over="velocity", by="normal_force").table()
+    np.testing.assert_array_equal(shown.loc[shown["what"] == "data", "y"], data["y"])
+
+
+def test_several_figures_and_parts_of_a_study_are_drawn(filled, capsys):
     assert main(["plot", filled, filled, "contact_fraction", "--over", "velocity", "--over", "normal_force"]) == 0
     assert main(["plot", filled, "friction_coefficient", "rms_slope", "--effects", "-o", "drawn"]) == 0
     assert (Path("drawn") / "small-rms_slope-effects.csv").exists()
-    assert "Traceback" not in capsys.readouterr().err
-    capsys.readouterr()
-    assert main([*command, "--units", "velocity=km/h", "--units", "contact_fraction=%", "-o", "drawn/mu.pdf"]) == 0
-    assert "--units contact_fraction: not shown in any figure that was drawn" in capsys.readouterr().err
-    named = ["plot", filled, "velocity", "--where", "friction_coefficient < 1e-4", "-o", "drawn/slow.png"]
-    assert main(named) == 0
+    assert main(["plot", filled, "velocity", "--where", "friction_coefficient < 1e-4", "-o", "drawn/slow.png"]) == 0
     assert "not drawn: cases other than friction_coefficient < 1e-4" in capsys.readouterr().err
     slow = pd.read_csv("drawn/slow.csv", comment="#")
-    slow = slow[slow["what"] == "data"]
-    assert len(slow) == int((mean < 1e-4).sum()) > 0
-    figure = mdr_dask.plot(filled, "friction_coefficient", over="velocity", by="normal_force")
-    assert (
-        mdr_dask.plot(filled, "friction_coefficient")
-        .table()
-        .equals(mdr_dask.plot(filled, "friction_coefficient", over="velocity").table())
-    )
-    shown = figure.table()
-    np.testing.assert_array_equal(shown.loc[shown["what"] == "data", "y"], data["y"])
+    mean = datasets(filled)[""]["friction_coefficient"].mean("realisation")
+    assert len(slow[slow["what"] == "data"]) == int((mean < 1e-4).sum()) > 0
 
 
 def test_a_warning_is_printed_once_for_all_figures(filled, capsys, monkeypatch):
@@ -173,10 +122,8 @@ def test_the_look_of_a_figure_needs_a_figure(filled, capsys):
 
 def test_outputs_of_a_model_of_ones_own_have_figures_too(tmp_path, monkeypatch, capsys):
     view = "--over normal_force --by sliding_distance"
-    page = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
-    module, campaign = (re.search(rf"^```{kind}\n(.*?)^```", page, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
-    (tmp_path / "wear_rate.py").write_text(module)
-    (tmp_path / "pin.yaml").write_text(campaign)
+    (tmp_path / "wear_rate.py").write_text(MODULE)
+    (tmp_path / "pin.yaml").write_text(PIN)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "wear_rate", raising=False)

@@ -1,18 +1,19 @@
 """A run as a guest: in the caller's process, on read-only disks, beside crashes, and with the files of strangers."""
 
 import os
-import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from test_own_model import CAMPAIGN, MODULE
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import mdr_dask
@@ -21,8 +22,6 @@ from mdr_dask.cli import main
 from mdr_dask.errors import MachineError, StoreError
 from mdr_dask.execute import Part, Resources
 
-PAGE = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
-MODULE, CAMPAIGN = (re.search(rf"^```{kind}\n(.*?)^```", PAGE, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
 PLACE = "    coefficient = case"
 
 
@@ -137,8 +136,6 @@ def test_a_fault_of_the_machine_is_no_failed_case(toy, url, monkeypatch):
     def full(_):
         raise OSError(28, "No space left on device")
 
-    from dataclasses import replace
-
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
     with monkeypatch.context() as patch:
         patch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", replace(toy.MODEL, compute=full))
@@ -195,8 +192,6 @@ def test_a_finished_study_is_verified_and_run_on_a_disk_that_is_read_only(toy, r
 
 
 def test_two_parts_that_were_computed_apart_are_joined_by_a_copy(toy, tmp_path):
-    from dataclasses import replace
-
     campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 3.0, 4.0])), blocks={"position": 1})
     one, two = str(tmp_path / "one.zarr"), str(tmp_path / "two.zarr")
     for number, url in ((1, one), (2, two)):
@@ -230,8 +225,6 @@ def test_a_zip_of_a_stranger_is_refused_before_it_is_unpacked(tmp_path, capsys, 
 
 def test_a_store_of_another_version_of_its_model_says_how_to_extend_it(toy, url, monkeypatch):
     """The remedy must hold for a model of the user too, which no version of mdr_dask brings back."""
-    from dataclasses import replace
-
     campaign = toy.campaign(toy.axis("position", [1.0]))
     execute.run(campaign, url, Resources(threads=1), lambda _: None)
     monkeypatch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", replace(toy.MODEL, version=2))

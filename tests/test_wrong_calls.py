@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from test_cli import CAMPAIGN
+from small_campaign import CAMPAIGN
 
 from mdr_dask.cli import main
 

@@ -151,8 +151,6 @@ def test_bad_numbers_are_refused_with_their_place(write, capsys, parameters, pla
     ("rows", "message"),
     [
         ("0,0\n1e-4,2e-6\n2e-4,1e-6\n1e-3,1e-3\n", "the profile must rise with the radius, got 1e-06 after 2e-06"),
-        ("0,0\n1e-4,nan\n2e-4,1e-6\n1e-3,1e-3\n", "profile.csv:3:6: column height: expected a number, got 'nan'"),
-        ("0,0\n1e-4,inf\n2e-4,1e-6\n1e-3,1e-3\n", "profile.csv:3:6: column height: expected a number, got 'inf'"),
         ("1e-5,0\n1e-4,1e-6\n2e-4,2e-6\n1e-3,1e-3\n", "must start at 0 and increase"),
         ("0,0\n1e-4,high\n", "profile.csv:3:6: column height: expected a number, got 'high'"),
     ],

@@ -21,6 +21,7 @@ STEEL = {
     "wear_coefficient": 1e-4,
     "cycles": 1e5,
 }
+BALL = np.linspace(0, 1e-3, 201).tolist()
 SCALARS = ("contact_radius", "wear_volume", "wear_volume_error", "contact_force", "stick_border")
 
 
@@ -130,30 +131,11 @@ def test_a_history_may_slip_everywhere():
     assert result.values["wear_volume"][0, 0] > 0
 
 
-def named(path):
-    from hashlib import sha256
-
-    return Table(
-        shape="table", file=DataFile(name=path.name, path=str(path), sha256=sha256(path.read_bytes()).hexdigest())
-    )
-
-
-def table(tmp_path, rows):
-    path = tmp_path / "profile.csv"
-    path.write_text("radius [m],height [m]\n" + "\n".join(f"{r!r},{f!r}" for r, f in rows))
-    return named(path)
-
-
-def table_case(shape, realisations=(0,), **changes):
-    settings = {k: v for k, v in STEEL.items() if k not in {"indenter", "normal_force"}}
-    return run(FrettingWear(indenter=shape, **{**settings, "depth": 4.7e-6, **changes}), realisations=realisations)
-
-
 def test_table_of_a_ball(tmp_path):
-    r = np.linspace(0, 1e-3, 201).tolist()
-    shape = table(tmp_path, [(x, x**2 / 0.02) for x in r])
-    measured = table_case(shape)
-    smooth = run(FrettingWear(**{**STEEL, "normal_force": None, "depth": 4.7e-6}))
+    (tmp_path / "ball.csv").write_text("radius [m],height [m]\n" + "\n".join(f"{x!r},{x**2 / 0.02!r}" for x in BALL))
+    shape = Table(shape="table", file=DataFile.of(tmp_path / "ball.csv"))
+    pressed = STEEL | {"normal_force": None, "depth": 4.7e-6}
+    measured, smooth = run(FrettingWear(**pressed | {"indenter": shape})), run(FrettingWear(**pressed))
     for name in ("wear_volume", "contact_radius", "contact_force"):
         assert measured.values[name][0, 0] == pytest.approx(smooth.values[name][0, 0], rel=1e-5)
 
@@ -161,12 +143,9 @@ def test_table_of_a_ball(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"wear_coefficient": -1e-4}, "greater than or equal to 0"),
-        ({"stick_radius": 0.5}, "leave one kind out"),
         ({"depth": 1e-6}, "either normal_force or depth"),
         ({"friction": None}, "also friction"),
         ({"indenter": Cone(shape="cone")}, "also indenter.angle"),
-        ({"cycles": -1.0}, "greater than or equal to 0"),
     ],
 )
 def test_bad_parameters(changes, message):

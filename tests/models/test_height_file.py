@@ -181,15 +181,18 @@ def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):
     path.write_text(SCANS[layout][0])
     with pytest.raises(DataError, match=message):
         read_scan(DataFile.of(path), units)
-    path.write_text(joined(np.c_[PLACE, PLACE**2 + 0.1 * PLACE]))
-    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name the columns"):
-        read_scan(DataFile.of(path), Units("um", "mm"))
-    path.write_text(joined(np.c_[HEIGHT, HEIGHT[::-1]]))
-    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name the columns"):
-        read_scan(DataFile.of(path), Units("um", "mm"))
-    path.write_text(joined(np.c_[np.arange(200), 2 + np.arange(200), HEIGHT]))
-    with pytest.raises(DataError, match="one column of positions and one of heights, got 3 columns: name the columns"):
-        read_scan(DataFile.of(path), Units("um", "mm"))
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [(PLACE, PLACE**2 + 0.1 * PLACE), (HEIGHT, HEIGHT[::-1]), (np.arange(200), 2 + np.arange(200), HEIGHT)],
+    ids=["two that rise", "two that do not", "three"],
+)
+def test_columns_that_may_be_positions_or_heights_need_names(columns, tmp_path):
+    (tmp_path / "line.txt").write_text(joined(np.column_stack(columns)))
+    message = f"one column of positions and one of heights, got {len(columns)} columns: name the columns"
+    with pytest.raises(DataError, match=message):
+        read_scan(DataFile.of(tmp_path / "line.txt"), Units("um", "mm"))
 
 
 def test_units_in_a_file_are_used_and_must_not_contradict_options(tmp_path):

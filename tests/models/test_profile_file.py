@@ -4,7 +4,6 @@ import sys
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
@@ -25,12 +24,6 @@ def test_a_bare_name_is_a_profile(tmp_path):
     np.testing.assert_allclose(line.height, HEIGHT, atol=1e-15)
 
 
-def test_header_units_comments_and_mark_are_tolerated(tmp_path):
-    line = line_of(write(tmp_path / "line.txt", "\ufeff# scanned\nx;z\nmm;um\n", ";"))
-    assert line.length == pytest.approx(0.016)
-    assert line.height.max() == pytest.approx(1e-6)
-
-
 def test_unit_can_be_given(tmp_path):
     write(tmp_path / "line.csv", header="")
     line = line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "um", "x_unit": "um"}))
@@ -39,35 +32,11 @@ def test_unit_can_be_given(tmp_path):
         line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "ich", "x_unit": "um"}))
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x [m]\n1\n2\n", "expected a column z"),
-        ("x,z\n1,2\n", r"line.csv:1:1: column x: expected its unit, such as 'x \[mm\]'"),
-        ("x [m],z [m]\n1,2\n3,4\n", "8 or more pairs"),
-        ("x [m],z [s]\n1,2\n3,4\n", "expected a length"),
-    ],
-)
-def test_files_that_hold_no_line(tmp_path, text, message):
-    (tmp_path / "line.csv").write_text(text)
-    with pytest.raises(DataError, match=message):
-        line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
-
-
 def test_other_formats_name_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     (tmp_path / "line.al3d").write_bytes(b"\x00")
     with pytest.raises(DataError, match=r"pip install 'mdr_dask\[formats\]'"):
         line_of(ProfileFile.model_validate(str(tmp_path / "line.al3d")))
-
-
-CONTEXT = {"to_si": lambda value, unit: float(value)}
-
-
-def test_a_campaign_refuses_a_bad_file_before_it_runs(tmp_path):
-    (tmp_path / "line.csv").write_text("x [m],z [m]\n1,2\n3,nothing\n")
-    with pytest.raises(ValidationError, match=r"line.csv:3:3: column z: expected a number, got 'nothing'"):
-        ProfileFile.model_validate(str(tmp_path / "line.csv"), context=CONTEXT | {"directory": tmp_path})
 
 
 def test_files_of_instruments_are_read_by_surface_topography(tmp_path):

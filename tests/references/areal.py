@@ -13,23 +13,9 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum
 def areal_surface(
     spectrum: Spectrum, points: tuple[int, int], size: tuple[float, float], seed: int, realisation: int
 ) -> FloatArray:
-    """Return a periodic isotropic surface, m, on a regular grid: h = sum_q B(q) exp(i (q x + phi)), mean 0.
+    """Return a periodic isotropic surface, m, without the waves that the grid does not resolve.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        C2D. Waves that the grid does not resolve are left out.
-    points : tuple of int
-        Numbers of points along x and y.
-    size : tuple of float
-        Lengths along x and y, m.
-    seed, realisation : int
-        They fix the phases.
-
-    Returns
-    -------
-    array, shape points
-        B(q) = 2 pi sqrt(C2D / (L_x L_y)), so that every surface has the same spectrum.
+    h = sum_q B(q) exp(i (q x + phi)), B(q) = 2 pi sqrt(C2D / (L_x L_y)): every surface has the same spectrum.
     """
     generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
     waves = fft.rfft2(generator.standard_normal(points), overwrite_x=True)  # phases of noise are those of a real field

@@ -14,19 +14,7 @@ TOUCHING = 1e-12  # of its height: tolerance of contact, for rounding
 def follow_kelvin(
     height: FloatArray, slope: FloatArray, schedule: Schedule, displacement: FloatArray, depth: float
 ) -> Response:
-    """Follow every element of a Kelvin foundation on a periodic line; time in tau.
-
-    Parameters
-    ----------
-    height, slope : array, shape (n,)
-        Profile of unit length, as in :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line`.
-    schedule : Schedule
-        As in :func:`follow_line`; time in tau.
-    displacement : array, shape (n,)
-        Of every element at the first moment; the profile stands over element j at ``x_j + travel``.
-    depth : float
-        Depth at the first moment.
-    """
+    """Follow every element on a periodic line of unit length, from displacements and a depth; time in tau."""
     line = periodic_line(height, slope)
     under, grade = np.empty(height.size), np.empty(height.size)
     under_elements(line, float(schedule.travels[0]), under, grade)

