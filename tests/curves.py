@@ -11,7 +11,7 @@ import numpy as np
 from mdr_dask import models
 from mdr_dask.models.base import Block, Model, Output, Parameters, Result, Status, quantity
 
-Shape = Literal["smooth", "kink", "jump", "flat", "gap", "bump", "knee"]
+Shape = Literal["smooth", "kink", "jump", "flat", "gap", "knee"]
 FUNCTIONS = {
     "smooth": lambda x, shift: np.tanh(np.log10(x) - shift),
     "kink": lambda x, shift: np.abs(np.log10(x) - shift),
@@ -19,7 +19,6 @@ FUNCTIONS = {
     "flat": lambda x, shift: np.ones_like(x),
     "gap": lambda x, shift: np.tanh(np.log10(x) - shift),
     "knee": lambda x, shift: 1 / np.sqrt(1 + 10 ** (2 * (shift - np.log10(x)))),
-    "bump": lambda x, shift: np.exp(-0.5 * ((np.log10(x) - shift) / 0.8) ** 2),
 }
 
 
@@ -28,13 +27,12 @@ class Curve(Parameters):
     shift: float = quantity("1", "place of the curve", default=0.3)
     noise: float = quantity("1", "scatter over realisations", default=0.0)
     shape: Shape = "smooth"
-    count: int = 1
 
 
 def compute(block: Block[Curve]) -> Result:
     x, shift, noise = block.column("x"), block.column("shift"), block.column("noise")
-    shapes, count = block.column("shape"), block.column("count")
-    y = np.array([float(FUNCTIONS[shape](a, b)) for a, b, shape in zip(x, shift, shapes, strict=True)]) / count
+    shapes = block.column("shape")
+    y = np.array([float(FUNCTIONS[shape](a, b)) for a, b, shape in zip(x, shift, shapes, strict=True)])
     values = np.repeat(y[:, None], len(block.realisations), axis=1)
     for case in range(block.cases):
         for column, number in enumerate(block.realisations):

@@ -11,10 +11,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks import __main__ as command
 from benchmarks import accuracy, campaigns, high_speed, peers
-from benchmarks.peers.friction import stepped
 from benchmarks.rows import read
-from benchmarks.runner import compare
-from benchmarks.solvers import SOLVERS, sliding
+from benchmarks.solvers import SOLVERS
 from benchmarks.surfaces import persson, road, validity
 
 #: Random cases of each family; more where a case takes milliseconds.
@@ -74,23 +72,6 @@ def test_solvers_are_compared_with_the_peers_that_are_installed(subject):
     rows = list(importlib.import_module(f"benchmarks.peers.{subject}").compared())
     assert {row.solver for row in rows} <= set(peers.ABOUT)
     assert all(row.error < 0.1 for row in rows if row.method == peers.OURS)
-
-
-@pytest.mark.slow
-def test_stepping_all_springs_tends_to_the_scheme_of_the_thesis():
-    """Friction of springs that are followed in time, on two grids; only the heights are shared."""
-    line, _ = sliding.generated(np.random.default_rng(0))
-    for grid in (2, 4):
-        case = sliding.Sliding(line, None, None, 0.01, 0.2)
-        steady = case.found(sliding.Request(0.01, grid, "backward_euler")).values
-        assert stepped(line, 0.01, 0.2, 128 * grid) == pytest.approx(steady, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_the_runner_ends_with_the_numbers_of_a_loop_after_a_kill(tmp_path):
-    compare.Trial("bare loop", tmp_path / "warm", 2).watched()
-    _, ours = compare.compare(tmp_path, 2000, ["mdr_dask"])
-    assert ours[-1] == "yes", ours
 
 
 @pytest.mark.slow

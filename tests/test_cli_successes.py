@@ -1,7 +1,6 @@
 """Further commands that succeed, with their options."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -71,22 +70,6 @@ def test_a_master_curve_of_a_store_is_that_of_its_table(store, capsys):
         assert main(["master-curve", source, "--over", "velocity", "--by", "normal_force", "--json"]) == 0
         found.append(json.loads(capsys.readouterr().out)["data_vars"]["shift_factor"]["data"])
     np.testing.assert_allclose(found[0], found[1], rtol=1e-6, atol=1e-9)
-
-
-def test_a_surface_is_printed_as_a_table_with_intervals(tmp_path, monkeypatch, capsys):
-    """What is not known of a scan has no column."""
-    monkeypatch.chdir(tmp_path)
-    place, height = np.arange(400) * 1e-2, np.random.default_rng(0).standard_normal(400).cumsum()
-    np.savetxt("scan.csv", np.column_stack([place, height]), delimiter=",", header="x [mm],z [um]", comments="")
-    assert main(["surface", "scan.csv"]) == 0
-    out = capsys.readouterr().out
-    assert main(["surface", "scan.csv", "--json"]) == 0
-    (row,) = json.loads(capsys.readouterr().out)["rows"]
-    unknown = [name for name, value in row.items() if value is None]
-    assert unknown
-    assert not any(re.search(rf"\b{name}\b", out) for name in unknown)
-    known = [name for name, value in row.items() if isinstance(value, float) and f"{name}_low" not in row]
-    assert all(f"{row[name]:.6g}" in out for name in known if not name.endswith(("_low", "_high")))
 
 
 def test_an_interrupted_command_reports_that_results_are_kept(monkeypatch, capsys):

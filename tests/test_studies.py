@@ -70,18 +70,6 @@ def test_python_and_the_command_line_give_the_same_table(url, capsys):
     pd.testing.assert_frame_equal(found.set_axis(list(printed), axis=1), printed)
 
 
-@pytest.mark.slow
-def test_statistics_figures_and_master_curves_of_a_dataset_and_of_its_path(study, url):
-    for source in (study, url):
-        reduced = mdr_dask.aggregate(source, ["mean"], select=["velocity=1 m/s"])
-        np.testing.assert_allclose(
-            reduced.friction_coefficient_mean[:, 0], study.friction_coefficient[:, -1].mean("realisation")
-        )
-        assert mdr_dask.plot(source, "velocity").axes
-        factors = mdr_dask.master_curve(source, over="velocity", of="friction_coefficient", by="normal_force")
-        assert factors.sizes["normal_force"] == 2
-
-
 def test_a_figure_is_shown_in_a_notebook(study):
     assert mdr_dask.plot(study, "velocity")._repr_png_().startswith(b"\x89PNG")
 

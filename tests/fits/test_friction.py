@@ -55,28 +55,6 @@ def test_a_failed_line_of_three_leaves_a_plateau():
     assert found.height[0] == pytest.approx(0.99, abs=0.03)
 
 
-@pytest.mark.parametrize("shape", [{"shape": "cone", "angle": 0.17}, {"shape": "parabola", "radius": 0.01}])
-def test_indenters_follow_their_law(shape):
-    data = store(
-        {"velocity": np.geomspace(1e-4, 1, 13)},
-        realisations=10,
-        length=0.01,
-        points=2000,
-        oversampling=2,
-        hurst=0.4,
-        rms_roughness=5e-5,
-        shear_modulus=1e6,
-        normal_force=10.0,
-        indenter=shape,
-    )
-    assert np.all(data.status == 1)
-    found = FIT["indenter"]({"": data})
-    # physics note section 4: within -5..+4 % of the law with 1.5 over these xi
-    assert found["rms_error_stated"] < 0.06
-    assert found["exponent_low"] < found["exponent"] < found["exponent_high"]
-    assert found["exponent"] == pytest.approx(1.5, abs=0.3)
-
-
 def test_bodies_outside_their_law_are_left_out():
     """A cone on three roughnesses: cases without enough roughness, and velocities of region IV, are left out."""
     data = store(

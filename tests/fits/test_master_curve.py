@@ -163,33 +163,6 @@ def test_tables_that_are_ambiguous_or_incomplete_are_refused():
         master_curve(frame.assign(velocity=1.0))
 
 
-def two_groups():
-    """Friction over force at four velocities and five temperatures: shifts -0.15 log v and Arrhenius."""
-    force, velocity, kelvin = (
-        a.ravel() for a in np.meshgrid(np.geomspace(1, 100, 15), np.geomspace(1e-3, 1, 4), np.linspace(280, 320, 5))
-    )
-    energy = 2e4 / (8.31446261815324 * np.log(10)) * (1 / kelvin - 1 / 300)
-    scatter = 1 + 0.003 * np.random.default_rng(0).standard_normal(force.size)
-    mu = law(force * 10**energy, velocity) * scatter
-    return pd.DataFrame({"force": force, "velocity": velocity, "temperature": kelvin, "mu": mu})
-
-
-def test_velocity_and_temperature_give_a_shift_each():
-    result = master_curve(two_groups())
-    assert result.attrs["second"] == "temperature"
-    assert float(result["power_exponent_low"]) < EXPONENT < float(result["power_exponent_high"])
-    assert float(result["power_exponent"]) == pytest.approx(EXPONENT, abs=0.01)
-    assert float(result["arrhenius_activation_energy"]) == pytest.approx(2e4, rel=0.1)
-    assert result.attrs["probability"] > 1e-3
-    moved = rereferenced(result, 1.0)
-    assert float(moved["shift_factor"].sel(velocity=1.0)) == 0
-    assert moved["second_factor"].identical(result["second_factor"])
-    again = moved["point_abscissa"] / 10 ** moved["point_shift"]
-    np.testing.assert_allclose(np.unique(again.round(6)), np.unique(two_groups()["force"].round(6)), rtol=1e-5)
-    for curve in (result, moved):
-        np.testing.assert_allclose(np.sort(curve["point_ordinate"]), np.sort(two_groups()["mu"]), rtol=1e-9)
-
-
 def plateau(temperatures, points, noise=0.005):
     """Modulus over frequency that runs into a plateau; neighbours of ten kelvin lie 1.4 decades apart."""
     random, rows = np.random.default_rng(0), []

@@ -4,32 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jump_blocks import EVERY, STEP, block
 from pydantic import ValidationError
 
-from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.base import Status
+from mdr_dask.models.velocity_jump import VelocityJump
 from mdr_dask.models.velocity_jump.solve import compute
 from mdr_dask.physics.surfaces import roughness
-
-EVERY = MODEL.with_companions(tuple(output.name for output in MODEL.outputs))
-BASE = {
-    "length": 0.002,
-    "points": 100,
-    "rms_roughness": 2e-6,
-    "shear_modulus": 1e7,
-    "relaxation_time": 1e-3,
-    "normal_force": 0.1,
-    "velocity": 0.05,
-    "relaxation_times": (0.05, 0.5, 2.0, 12.0),
-}
-STEP = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
-
-
-def block(columns: dict[str, np.ndarray] | None = None, **changes: object) -> Block[VelocityJump]:
-    columns = columns or {}
-    cases = next(iter(columns.values())).size if columns else 1
-    kept = {name: value for name, value in (BASE | changes).items() if value is not None}
-    return Block(VelocityJump.model_validate(kept), columns, cases, (0, 3), 5, EVERY)
 
 
 def test_one_step_is_the_jump() -> None:

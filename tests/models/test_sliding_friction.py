@@ -5,6 +5,7 @@ import pytest
 from friction_store import relative_error
 
 from mdr_dask.models.base import Block, Status
+from mdr_dask.models.parts.material import Material
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 
 BASE = SlidingFriction(
@@ -125,3 +126,43 @@ def test_friction_below_zero_lies_within_an_error_that_is_not():
     ]
     (coarse, error), (fine, _) = ([one.values[name].item() for name in wanted] for one in found)
     assert coarse < 0 < fine < coarse + error
+
+
+SOLID = {"static_modulus": 1e7, "glass_modulus": 5e7, "relaxation_time": 1e-3}
+
+
+def of_material(material, columns):
+    """Return a block whose solid is a material instead of the Kelvin body."""
+    parameters = BASE.model_dump(exclude={"shear_modulus", "relaxation_time"}, exclude_none=True)
+    columns = {name: np.asarray(values) for name, values in columns.items()}
+    cases = len(next(iter(columns.values())))
+    return Block(SlidingFriction.model_validate(parameters | {"material": material}), columns, cases, (0, 1), 7, ALL)
+
+
+def test_temperature_and_velocity_are_interchangeable():
+    """Relaxation times multiplied by a_T = 10 have the same effect as the velocity multiplied by a_T."""
+    law = {"wlf": {"c1": 11.0, "c2": 110.0, "reference": 300.0}}
+    warm = {"standard_solid": SOLID, "temperature": 290.0} | law
+    cool = MODEL.compute(of_material(warm, {"velocity": [0.01]}))
+    factor = 10 ** (11 * 10 / 100)
+    same = MODEL.compute(of_material({"standard_solid": SOLID}, {"velocity": [0.01 * factor]}))
+    assert cool.values["friction_coefficient"] == pytest.approx(same.values["friction_coefficient"], rel=1e-9)
+
+
+def test_material_can_vary():
+    materials = np.empty(2, dtype=object)
+    materials[:] = [
+        Material.model_validate({"kelvin": {"shear_modulus": 1e7, "relaxation_time": 1e-3}}),
+        Material.model_validate({"standard_solid": SOLID}),
+    ]
+    result = MODEL.compute(of_material(materials[0], {"material": materials}))
+    assert np.all(result.status == Status.DONE)
+    assert np.all(result.values["friction_coefficient"][0] != result.values["friction_coefficient"][1])
+
+
+def test_an_impossible_material_is_a_failed_case_with_a_message():
+    bad = {"prony": {"static_modulus": 1e7, "moduli": (1.0,), "times": (-1.0,)}}
+    result = MODEL.compute(of_material(bad, {"velocity": [0.1]}))
+    assert np.all(result.status == Status.FAILED)
+    assert "relaxation times must be positive" in result.messages[0, 0]
+    assert result.solves == 0

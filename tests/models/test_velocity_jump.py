@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from jump_blocks import BASE, block
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Result, Status
@@ -15,39 +16,28 @@ from mdr_dask.models.velocity_jump.solve import compute, distinct
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.transients import accuracy as jumps
 
-EVERY = MODEL.with_companions(tuple(output.name for output in MODEL.outputs))
-BASE = {
-    "length": 0.002,
-    "points": 400,
-    "rms_roughness": 2e-6,
-    "shear_modulus": 1e7,
-    "relaxation_time": 1e-3,
-    "normal_force": 0.1,
-    "velocity": 0.05,
-    "relaxation_times": (0.01, 0.1, 1.0, 10.0),
-}
+LINE = BASE | {"points": 400, "relaxation_times": (0.01, 0.1, 1.0, 10.0)}
 
 
 def parameters(**changes: object) -> VelocityJump:
-    return VelocityJump.model_validate(BASE | changes)
+    return block(**LINE | changes).parameters
 
 
-def block(
+def of_line(
     columns: dict[str, np.ndarray], realisations: tuple[int, ...] = (0, 3), **changes: object
 ) -> Block[VelocityJump]:
-    cases = next(iter(columns.values())).size if columns else 1
-    return Block(parameters(**changes), columns, cases, realisations, 5, EVERY)
+    return block(columns, realisations, **LINE | changes)
 
 
 def test_a_transient_that_misses_the_accuracy_has_a_warning() -> None:
-    coarse = block({"velocity": np.array([0.05])}, (0, 1), hurst=0.3, oversampling=2, steps_per_decade=4)
+    coarse = of_line({"velocity": np.array([0.05])}, (0, 1), hurst=0.3, oversampling=2, steps_per_decade=4)
     assert not compute(coarse).messages
     messages = compute(replace(coarse, accuracy=0.01)).messages
     assert all("is missed; estimated relative errors: friction_coefficient " in messages[0, line] for line in (0, 1))
 
 
 def test_transients_below_the_accuracy_are_left_out_and_counted_in_the_error() -> None:
-    whole = block({"velocity": np.array([1e-4, 1e-3, 5e-3, 0.05, 0.5])})
+    whole = of_line({"velocity": np.array([1e-4, 1e-3, 5e-3, 0.05, 0.5])})
     exact, quick = compute(whole).values, compute(replace(whole, accuracy=1e-2)).values
     for name in ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after"):
         assert np.array_equal(quick[name], exact[name])
@@ -71,7 +61,7 @@ def test_equal_cases_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return found
 
     monkeypatch.setattr(jumps, "jump_between", counted)
-    same = block(
+    same = of_line(
         {
             "shear_modulus": np.array([1e7, 2e7, 1e7, 1e7, 1e7]),
             "normal_force": np.array([0.1, 0.2, 10.0, 0.1, 0.1]),
@@ -88,7 +78,7 @@ def test_equal_cases_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_jump_follows_the_slope_in_region_one() -> None:
     """In region I, friction is proportional to the velocity (eq. 4.9) and does not relax after the jump."""
-    result = compute(block({}, velocity=1e-6)).values
+    result = compute(of_line({}, velocity=1e-6)).values
     before, jump = result["friction_coefficient_before"], result["friction_coefficient_jump"]
     assert np.allclose(jump / before, 0.2, rtol=2e-3)
     after = result["friction_coefficient_after"]
@@ -96,15 +86,15 @@ def test_jump_follows_the_slope_in_region_one() -> None:
 
 
 def test_error_of_the_transient_covers_it() -> None:
-    coarse = compute(block({}, tuple(range(6))))
-    fine = compute(block({}, tuple(range(6)), oversampling=32, steps_per_decade=96))
+    coarse = compute(of_line({}, tuple(range(6))))
+    fine = compute(of_line({}, tuple(range(6)), oversampling=32, steps_per_decade=96))
     for name in ("friction_coefficient", "indentation_depth"):
         error = np.abs(coarse.values[name] - fine.values[name])
         assert np.mean(error <= coarse.values[f"{name}_error"]) > 0.8, name
 
 
 def test_bad_line_is_a_status() -> None:
-    result = compute(block({}, longest_wavelength=1e-6))
+    result = compute(of_line({}, longest_wavelength=1e-6))
     assert np.all(result.status == Status.FAILED)
     assert all("cut-off" in message for message in result.messages.values())
     assert np.all(np.isnan(result.values["friction_coefficient"]))
@@ -120,7 +110,7 @@ def test_bad_line_is_a_status() -> None:
     ],
 )
 def test_impossible_jumps_are_failed_cases_with_a_message_in_every_realisation(name, value, message) -> None:
-    result = compute(block({name: np.array([BASE.get(name, 0.2), value])}))
+    result = compute(of_line({name: np.array([LINE.get(name, 0.2), value])}))
     assert result.status.tolist() == [[Status.DONE] * 2, [Status.FAILED] * 2]
     assert [message in result.messages.get((1, r), "") for r in (0, 1)] == [True] * 2
     assert {case for case, _ in result.messages} == {1}
@@ -141,18 +131,18 @@ def test_impossible_parameters_are_refused(change: dict[str, object], message: s
 
 def test_depth_of_a_jump_comes_from_the_march() -> None:
     """The depth begins and ends at the steady depths, and agrees with the solution for any history."""
-    found = compute(block({}, relaxation_times=(0.0, 0.5, 20.0), velocity_change=-0.5)).values["indentation_depth"]
+    found = compute(of_line({}, relaxation_times=(0.0, 0.5, 20.0), velocity_change=-0.5)).values["indentation_depth"]
     steady = [compute_friction(v).values["indentation_depth"][0] for v in (0.05, 0.025)]
     assert np.allclose(found[0, :, 0], steady[0], rtol=1e-4)
     assert np.allclose(found[0, :, 2], steady[1], rtol=1e-4)
     step = {"shape": "steps", "times": [0.0], "velocities": [0.025]}
-    followed = compute(block({}, relaxation_times=(0.0, 0.5, 20.0), protocol=step, oversampling=8))
+    followed = compute(of_line({}, relaxation_times=(0.0, 0.5, 20.0), protocol=step, oversampling=8))
     assert np.allclose(found, followed.values["indentation_depth"], rtol=2e-4)
 
 
 def compute_friction(velocity: float) -> Result:
     """Solve steady sliding of the same body."""
-    shared = {name: value for name, value in BASE.items() if name != "relaxation_times"}
+    shared = {name: value for name, value in LINE.items() if name != "relaxation_times"}
     steady = SlidingFriction.model_validate(shared | {"velocity": velocity})
     return sliding.compute(Block(steady, {}, 1, (0, 3), 5, ("friction_coefficient", "indentation_depth"), 1e-4))
 
@@ -184,7 +174,7 @@ def test_ends_are_the_steady_solvers(seed: int) -> None:
     found = compute(Block(parameters(**case), {}, 1, (seed,), 5, MODEL.with_companions(ENDS), 0.01)).values
     for name, change in (("before", 0.0), ("after", case["velocity_change"])):
         shared = {
-            key: value for key, value in (BASE | case).items() if key not in ("relaxation_times", "velocity_change")
+            key: value for key, value in (LINE | case).items() if key not in ("relaxation_times", "velocity_change")
         }
         steady = SlidingFriction.model_validate(shared | {"velocity": case["velocity"] * (1 + change)})
         truth = sliding.compute(Block(steady, {}, 1, (seed,), 5, ("friction_coefficient",), 1e-5))

@@ -194,22 +194,3 @@ def test_probabilities_of_the_rig():
     error = spread * np.sqrt(1 / 6 + 1 / 16)
     assert np.all(np.abs(values.mean(axis=0) - list(CHECKED.values())) < 4 * error)
     assert np.all(error < 1.0)
-
-
-@pytest.mark.slow
-def test_creep_leaves_the_expected_probability():
-    """Windows a window's eighth apart over one revolution; with creep every revolution sees other pairings."""
-    points, level, window, strength = 40_000, 1.2, 120, 1e-3
-    values = {slip: [] for slip in (0.0, 0.05, 1.0)}
-    for seed in range(16):
-        line_1, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed, rms=np.sqrt(0.5))
-        line_2, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed + 1, rms=np.sqrt(0.5))
-        for slip, found in values.items():
-            positions = bt.creep_positions(np.arange(0, points, window // 8), points, slip)
-            pair = bt.Pair(through_heights(line_1), through_heights(line_2), level, 1.0, strength)
-            found.append((bt.judge_windows(pair, window, positions) > 0).mean())
-    means = {slip: np.mean(v) for slip, v in values.items()}
-    errors = {slip: np.std(v, ddof=1) / 4 for slip, v in values.items()}
-    assert 0.1 < means[0.0] < 0.9
-    for slip in (0.05, 1.0):
-        assert abs(means[slip] - means[0.0]) < 4 * np.hypot(errors[slip], errors[0.0])

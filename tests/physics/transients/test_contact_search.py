@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 from references.largest_displacement import judged, marched, searched_afresh
 
-from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, DRAG, SUMS, barriers_for, patches_at
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients import patches, velocity_jump
-from mdr_dask.physics.transients.contact_search import Reachable, find_contact, workspace_for
-from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
-from mdr_dask.physics.transients.patches import LOAD, History
-from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation, jump_between
+from mdr_dask.physics.transients.patches import LOAD
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation
 
-LONG = 100.0  # relaxation times after which nothing is left of the state before
 TIMES = np.geomspace(1e-3, 5, 25)
 EVERY_MOMENT = 1000
 
@@ -24,36 +18,6 @@ def rough(points: int, hurst: float, oversampling: int = 4, seed: int = 7) -> Pr
     amplitude, phase = roughness.amplitudes(points // 2, hurst), roughness.phases(seed, 1, points // 2)
     nodes = points * oversampling
     return PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
-
-
-def everywhere(line: PreparedLine) -> tuple[Reachable, np.ndarray]:
-    """Return the whole line as one run, and no bound for any cell."""
-    nodes = line.track.height.size
-    return Reachable(np.array([[0, nodes - 1]]), 0.0), np.full(nodes, -np.inf)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("hurst", "oversampling", "deborah"), [(0.0, 4, 1e-3), (0.4, 1, 0.3), (0.4, 4, 1e3), (0.8, 1, 10.0), (0.8, 4, 0.3)]
-)
-def test_contact_long_after_a_jump_is_that_of_the_steady_sweep(hurst: float, oversampling: int, deborah: float) -> None:
-    """On coarse grids contact begins and ends inside single cells, which both must find."""
-    line = rough(200, hurst, oversampling)
-    for depth in (0.01, 0.1, 0.5, 2.0, 6.0):
-        first, barriers = line.patches(0.5 * depth, 2 * deborah)[0], line.barriers(deborah)
-        history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
-        reachable, nothing = everywhere(line)
-        work = workspace_for(int(line.track.cells), barriers, nothing)
-        found = find_contact(Instant(line.track, first, history, LONG, deborah, 0.0), reachable, work)
-        sums = np.empty(SUMS)
-        start, end = patches_at(line.cells, line.blocks, barriers_for(int(line.track.cells)), deborah, depth, sums)
-        assert found == start.size
-        assert np.allclose(work.start[:found], start, rtol=0, atol=1e-6)
-        assert np.allclose(work.end[:found], end, rtol=0, atol=1e-6)
-        # the begin of contact is found to 1e-7 of a cell; in fast, light contact the force there is large
-        assert work.sums[LOAD] == pytest.approx(sums[DISPLACEMENT], rel=2e-5)
-        # the sweep adds up what is dissipated, the march forces: the same in a steady state
-        assert work.sums[patches.DRAG] == pytest.approx(sums[DRAG], rel=2e-5)
 
 
 @pytest.mark.parametrize("ratio", [0.2, 10.0])
@@ -73,21 +37,6 @@ def test_every_moment_carries_the_load(ratio: float) -> None:
             missing.append(abs(work.sums[LOAD] / marching.load - 1))
     assert len(missing) > 100
     assert np.mean(np.array(missing) > 1e-3) < 0.02  # the load is discontinuous where a patch appears or vanishes
-
-
-@pytest.mark.parametrize(
-    ("hurst", "load", "deborah", "ratio"),
-    [(0.7, 1.16, 1.0, 0.4), (0.7, 25.0, 1.0, 5.0), (0.3, 5.4, 1.0, 5.0), (0, 0.0539, 0.147, 5.0)],
-)
-def test_unreachable_stretches_change_nothing(hurst, load, deborah, ratio, monkeypatch) -> None:
-    line, both = rough(1000, hurst, 4, 2014), np.array([[deborah, ratio * deborah]])
-    limits, request = steady_limits(line, np.array([load]), both)[0], MarchRequest(TIMES, 1000 * np.pi, 6)
-    near = jump_between(line, load, both[0], limits, request)
-    reachable, nothing = everywhere(line)
-    monkeypatch.setattr(velocity_jump, "_runs", lambda *_: (reachable.runs, nothing))
-    whole = jump_between(line, load, both[0], limits, request)
-    assert near.outcome == whole.outcome == Outcome.CONVERGED
-    assert np.max(np.abs(near.trace - whole.trace)) <= 0.01 * np.max(np.abs(whole.trace - whole.after))
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.sliding.kelvin import DRAG
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
@@ -13,14 +12,6 @@ def rough(points=200, hurst=0.5, oversampling=4):
     amplitude, phase = roughness.amplitudes(points // 2, hurst), roughness.phases(11, 0, points // 2)
     nodes = points * oversampling
     return PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
-
-
-def test_limits_are_sweeps_at_their_depths():
-    deborah, loads, line = np.array([[2e-4, 2.4e-4], [0.01, 0.012], [0.3, 0.1]]), np.array([0.02, 0.3, 1.5]), rough()
-    for found, speeds in zip(steady_limits(line, loads, deborah), deborah, strict=True):
-        for depth, drag, speed in zip(found.depth, (found.before, found.after), speeds, strict=True):
-            assert drag == line.patches(depth + line.cells.top, speed * line.track.cells)[1][DRAG]
-        assert (found.first is found.slower) == (speeds[0] <= speeds[1])
 
 
 def test_limits_of_a_case_do_not_depend_on_other_cases_nor_on_guesses():
