@@ -11,7 +11,7 @@ from test_execute import run
 from mdr_dask import bars as shown
 from mdr_dask import compile_clock as clocks
 from mdr_dask import execute
-from mdr_dask.bars import at_work, reporter
+from mdr_dask.bars import at_work, describe, reporter
 from mdr_dask.execute import Progress
 from mdr_dask.models.base import Status
 from mdr_dask.task import Outcome
