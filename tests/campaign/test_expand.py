@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pydantic import model_validator
 
-from mdr_dask import models
 from mdr_dask.campaign import loads
 from mdr_dask.campaign.variation import Spread, spaced
 from mdr_dask.errors import CampaignError
-from mdr_dask.models.base import Parameters, quantity
 
 HEAD = "name: a\nmodel: rubbing\nparameters:\n  length: 20 mm\n"
 
@@ -159,45 +155,3 @@ def test_whole_ranges_are_strictly_monotonic(low, high, count, geometric):
     assert (values[0], values[-1]) == (low, high)
     assert all((b - a) * (high - low) > 0 for a, b in pairwise(values))
     assert len(values) <= min(count, abs(high - low) + 1)
-
-
-class Free(Parameters):
-    force: float = quantity("N", "a force", gt=0, lt=10)
-    speed: float = quantity("m/s", "a speed", gt=0)
-
-
-class Bound(Free):
-    @model_validator(mode="after")
-    def _not_two(self):
-        if self.force == 2:
-            raise ValueError(f"expected no force of 2 N, got {self.force}")
-        return self
-
-
-def _with(kind, body, rubbing, monkeypatch):
-    calls = []
-    check = kind.model_validate.__func__
-    monkeypatch.setattr(kind, "model_validate", classmethod(lambda *a, **k: (calls.append(1), check(*a, **k))[1]))
-    monkeypatch.setattr(models, "load", lambda _: replace(rubbing, parameters=kind, outputs=rubbing.outputs[:1]))
-    return loads(f"name: a\nmodel: rubbing\n{body}", "a.yaml", "."), calls
-
-
-@pytest.mark.parametrize(
-    "body",
-    [
-        "parameters: {force: {linear: [1, 3, 5001]}, speed: 1}",
-        "sampling: {sobol: 5001}\nparameters: {force: {linear: [1, 3]}, speed: {geometric: [1, 2]}}",
-    ],
-)
-def test_ranges_of_independent_parameters_are_checked_at_their_ends(body, rubbing, monkeypatch):
-    campaign, calls = _with(Free, body, rubbing, monkeypatch)
-    assert len(campaign.series[0].axes[0].values) == 5001
-    assert len(calls) < 20
-    for wrong in (body.replace("[1, 3", "[-1, 3"), body.replace("[1, 3", "[1, 13")):
-        with pytest.raises(CampaignError, match="force: expected a number"):
-            _with(Free, wrong, rubbing, monkeypatch)
-
-
-def test_every_value_is_checked_together_with_others_where_the_model_has_such_checks(rubbing, monkeypatch):
-    with pytest.raises(CampaignError, match="expected no force of 2 N"):
-        _with(Bound, "parameters: {force: {linear: [1, 3, 5]}, speed: 1}", rubbing, monkeypatch)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from test_extremes import KELVIN, LINE, WEAR
 
 from mdr_dask.models import fretting_wear, sliding_friction
 from mdr_dask.models.base import Block, Status
@@ -12,26 +13,8 @@ from mdr_dask.physics.mdr.transforms import forward_transform
 from mdr_dask.physics.surfaces.shapes import PowerLaw, RoundedCone
 from mdr_dask.physics.wear.rules import limit
 
-STEEL = {
-    "contact_modulus": 115e9,
-    "effective_shear_modulus": 90e9,
-    "friction": 0.6,
-    "amplitude": 5e-6,
-    "hardness": 2e9,
-    "wear_coefficient": 1e-4,
-    "cycles": 1e5,
-    "depth": 20e-6,
-}
-RUBBER = {
-    "length": 0.02,
-    "points": 64,
-    "rms_roughness": 1e-7,
-    "shear_modulus": 1e7,
-    "relaxation_time": 1e-3,
-    "normal_force": 0.2,
-    "velocity": 0.01,
-    "oversampling": 128,
-}
+STEEL = WEAR | {"amplitude": 5e-6, "cycles": 1e5, "depth": 20e-6}
+RUBBER = LINE | KELVIN | {"rms_roughness": 1e-7, "normal_force": 0.2, "velocity": 0.01, "oversampling": 128}
 SHARP = {"shape": "rounded_cone", "angle": 0.1, "tip_radius": 1e-8}
 BLUNT = {"shape": "rounded_cone", "angle": 1.2, "tip_radius": 0.01}
 CONE, PARABOLA = {"shape": "cone", "angle": 0.1}, {"shape": "parabola", "radius": 0.01}

@@ -1,6 +1,5 @@
 """The model sliding_friction: every kind of line with every kind of solid, and the errors of the outputs."""
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -8,11 +7,7 @@ import pytest
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.surfaces.rough_line import RoughLine
-from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.surfaces.waves import Waves
 
 OUTPUTS = tuple(MODEL.companions)
 ALL = MODEL.with_companions(OUTPUTS)
@@ -96,34 +91,3 @@ def test_errors_are_computed_only_on_request():
     assert set(without.values) == {"friction_coefficient"}
     friction = without.values["friction_coefficient"]
     assert friction.tobytes() == with_errors.values["friction_coefficient"].tobytes()
-
-
-@dataclass(frozen=True)
-class Wedge:
-    """A wedge with a flat tip, as an example of a shape that a user defines; `flat` is half the width of the tip."""
-
-    steepness: float
-    flat: float
-
-    def at(self, x):
-        left = self.steepness * np.where(x > self.flat, -1.0, np.where(x <= -self.flat, 1.0, 0.0))
-        right = self.steepness * np.where(x >= self.flat, -1.0, np.where(x < -self.flat, 1.0, 0.0))
-        return -self.steepness * np.maximum(np.abs(x) - self.flat, 0.0), left, right
-
-    def scaled(self, length, height):
-        return Wedge(self.steepness * length / height, self.flat / length)
-
-
-@pytest.mark.parametrize("terms", [None, PronyTerms((4.0,), (0.01,))], ids=["kelvin", "terms"])
-def test_a_shape_needs_only_heights_and_slopes(terms):
-    """A wedge without a flat is a cone; with a wide flat, it carries the same load at a smaller depth."""
-    line = roughness.amplitudes(50, 0.7) * 0.5 * np.exp(1j * roughness.phases(1, 0, 50))
-    numbers = np.array([0.02]), np.array([1.0])
-    request = Request(accuracy=1e-3)
-    cone, wedge, flat = (
-        solve(RoughLine(Waves(line, 100), body), terms, *numbers, request)[0]
-        for body in (PowerLaw(40.0, 1.0), Wedge(40.0, 0.0), Wedge(40.0, 0.125))
-    )
-    for column in ("drag", "depth", "contact_fraction", "contact_slope"):
-        assert getattr(wedge, column) == pytest.approx(getattr(cone, column), rel=1e-9)
-    assert flat.depth[0] < 0.8 * cone.depth[0]

@@ -47,20 +47,6 @@ def test_every_format_of_a_map_is_the_same_map(tmp_path):
         assert spectrum.rms_gradient() == pytest.approx(SPECTRUM.rms_gradient(), rel=0.02)
 
 
-def test_scans_of_a_surface_give_its_spectrum_and_not_their_own(tmp_path):
-    wide = self_affine(0.7, LENGTH / 16, LENGTH / 128, 1e-6)
-    height = areal_surface(wide, (64, 1024), (LENGTH / 16, LENGTH), 1, 0)[::8]
-    place = np.arange(1024) * LENGTH / 1024
-    for k in range(8):
-        rows = "\n".join(f"{x * 1e3:.9g},{1e6 * z:.9g}" for x, z in zip(place, height[k], strict=True))
-        (tmp_path / f"{k}.csv").write_text("x [mm],z [um]\n" + rows)
-    scans = surface(tmp_path, scan={"files": [f"{k}.csv" for k in range(8)]})
-    gradients = [spectrum.rms_gradient() for spectrum in spectra_of(scans)]
-    assert np.sqrt(np.mean(np.square(gradients))) == pytest.approx(wide.rms_gradient(), rel=0.05)
-    own = np.std(np.diff(height, axis=1)) / (LENGTH / 1024)
-    assert own < 0.8 * np.mean(gradients)
-
-
 def test_noise_begins_where_roughness_ends(tmp_path):
     """Roughness of a map ends at a 64th of its length, that of a scan at a 128th; white noise goes on."""
     generator = np.random.default_rng(1)

@@ -76,22 +76,6 @@ def test_a_melt_is_shifted_by_both_moduli_with_b_t_and_offsets():
     np.testing.assert_allclose(compliance.vertical, -b_t, atol=0.06)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("channels", [slice(2), slice(1)])
-def test_intervals_hold_the_planted_factors_of_melts_and_rubbers(channels):
-    """Twelve materials with b_T, offsets of 1 to 5 %, noise of 1 to 3 % and overlaps of 0.3 to 0.6."""
-    families = [
-        of_a_polymer(number, np.random.default_rng((number, seed)), channels)
-        for number in range(12)
-        for seed in range(300, 301)
-    ]
-    half = np.concatenate([family.merged().stated for family in families])
-    ratios = np.concatenate([family.judged() for family in families])
-    assert np.mean(ratios <= 1) >= 0.85  # of some 60 factors
-    assert np.max(ratios) < 3
-    assert np.median(half) < (0.06 if channels == slice(2) else 0.13)
-
-
 def test_rereferencing_is_fitting_with_another_reference():
     groups, curves, _, _ = family(5)
     free = superpose(groups, curves)

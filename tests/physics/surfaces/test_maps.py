@@ -126,22 +126,6 @@ def test_spikes_are_outliers_and_roughness_is_not(name):
         assert [*map(tuple, np.argwhere(outliers(SurfaceMap(spiky, (1e-3, 1e-3)))).tolist())] == places
 
 
-def test_direction_is_seen():
-    isotropic, _ = surface(0.5)
-    assert spectrum_of_map(without_trend(isotropic, "plane")).anisotropy() < 0.1
-    stretched, _ = surface(0.5, size=(LENGTH, 3 * LENGTH))
-    found = spectrum_of_map(SurfaceMap(stretched.height, isotropic.size), hann=False)
-    assert found.anisotropy() > 0.5
-    assert np.sqrt(found.slopes[1] / found.slopes[0]) == pytest.approx(3, rel=0.02)
-    cut = found.along(1).line(LENGTH, 127)
-    slope = np.sqrt(np.sum((cut * 2 * np.pi / LENGTH * np.arange(1, 128)) ** 2) / 2)
-    assert slope == pytest.approx(np.sqrt(found.slopes[1]), rel=1e-9)
-    lines = isotropic.height + np.random.default_rng(4).standard_normal(256) * 3e-7
-    striped = spectrum_of_map(SurfaceMap(lines, isotropic.size))
-    assert striped.axes[1] > 10 > 3 > striped.axes[0]
-    assert striped.anisotropy() > 0.3
-
-
 @pytest.mark.parametrize("hurst", HURST)
 def test_the_exponent_and_the_cut_offs_are_found(hurst):
     """A roll-off at a sixteenth of the map, windowed: inside the interval; noise is distinguished from roughness."""

@@ -84,17 +84,6 @@ def test_lines_that_cannot_be_used_are_refused(x, z, message):
         measured.measured_line(list(x), list(z))
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:SurfaceTopography")  # its own names
-def test_figures_agree_with_surface_topography():
-    topography = pytest.importorskip("SurfaceTopography")
-    height, _ = self_affine()
-    scan = topography.UniformLineScan(height, LENGTH, periodic=True)
-    assert measured.rms_height(height) == pytest.approx(scan.rms_height_from_profile(), rel=1e-9)
-    finest = measured.resampled(height, 64 * POINTS)  # its slope is that of the chord, of second order
-    chords = topography.UniformLineScan(finest, LENGTH, periodic=True)
-    assert measured.rms_slope(height, LENGTH) == pytest.approx(chords.rms_slope_from_profile(), rel=1e-3)
-
-
 @pytest.mark.parametrize("points", [16, 17])
 @pytest.mark.parametrize("kind", ["noise", "alternating"])
 def test_rms_slope_is_that_of_the_line_that_solvers_slide_over(kind, points):

@@ -87,19 +87,6 @@ def test_scans_give_back_the_spectrum(hurst):
     assert slope == pytest.approx(wanted, rel=0.05)
 
 
-def test_the_spectrum_goes_on_by_a_power_law_only_where_asked():
-    spectrum = self_affine(0.7, 1e-2, 1e-4)
-    inner = spectrum.between(5e-3, 2e-4)
-    assert inner.wavelengths == pytest.approx((5e-3, 2e-4), rel=1e-12)
-    assert inner.at(2 * np.pi / 1e-3) == pytest.approx(spectrum.at(2 * np.pi / 1e-3), rel=1e-12)
-    assert inner.at(2 * np.pi / 9e-3) == 0
-    longer = inner.continued(1e-2, 1e-4)
-    q = np.geomspace(*spectrum.wavenumber, 7)
-    np.testing.assert_allclose(longer.at(q), spectrum.at(q), rtol=1e-10)
-    with pytest.raises(DataError, match="expected cut-offs within the wavelengths of the spectrum"):
-        spectrum.between(1e-5)
-
-
 @pytest.mark.parametrize(
     ("q", "density", "message"),
     [

@@ -11,6 +11,7 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.foundation import KELVIN
 from mdr_dask.physics.transients.elements.loading_history import Piece, trace
+from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, velocity_jump
 
 POINTS, OVERSAMPLING = 100, 8
@@ -133,19 +134,11 @@ def test_bad_numbers_are_a_status() -> None:
         assert solved(height, slope, load, deborahs, TIMES).outcome == Outcome.INVALID
 
 
-def test_transient_within_the_accuracy_is_not_computed() -> None:
-    height, slope = line()
-    accuracy, skipped = 1e-2, 0
-    for deborah in np.geomspace(1e-5, 1, 16):
-        deborahs = deborah, 1.2 * deborah
-        long = solved(height, slope, LOAD, deborahs, TIMES, 8)
-        short = solved(height, slope, LOAD, deborahs, TIMES, 8, accuracy)
-        assert (short.before, short.at, short.after) == (long.before, long.at, long.after)
-        error = np.max(np.abs(short.trace - long.trace))
-        assert error < accuracy * long.after
-        assert short.moments <= long.moments
-        if short.left_out > 0:
-            skipped += 1
-            assert short.moments == 0
-            assert error < 1.4 * short.left_out <= 1.4 * accuracy * long.after
-    assert 0 < skipped < 16
+@pytest.mark.parametrize("change", [-0.5, 0.5])
+def test_full_contact_is_exact(change: float) -> None:
+    """The drag is D times the mean square of the slope, and changes with the velocity at once (eq. 3.14)."""
+    prepared, deborah = PreparedLine.of(periodic_line(*line())), np.array([[0.1, 0.1 * (1 + change)]])
+    (found,) = steady_limits(prepared, np.array([100.0]), deborah)
+    assert found.is_full
+    assert found.at == pytest.approx(found.after, rel=1e-12)
+    assert found.after / found.before == pytest.approx(1 + change, rel=1e-12)

@@ -69,16 +69,6 @@ def test_limit_pressure_lives_on_the_stick_area_only():
     np.testing.assert_allclose(p[2:], 0, atol=1e-10)
 
 
-def test_fast_rule_solves_its_equation():
-    c, xi, h = 0.455, 0.8, 1e-5
-    x = np.array([0.5, 0.8, 0.99, 1.05, 1.1])
-    before, now, after = (wear.fast(PARABOLA, c, N, xi).image(x) for N in (3 - h, 3.0, 3 + h))
-    rate = (after - before) / (2 * h)
-    eta, g_c, a = 1 - c**2, c**2, wear.limit_radius(PARABOLA, c)
-    expected = xi / a * np.where(x < 1, (1 - now) * (now - g_c) / eta, -(now - 1))
-    np.testing.assert_allclose(rate, expected, rtol=1e-6)  # central difference
-
-
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 3.5])
 def test_fast_rule_starts_at_the_virgin_body_and_ends_at_the_limit(exponent):
     profile = PowerProfile(exponent)
