@@ -20,7 +20,6 @@ CASES = {"wear": 2, "velocity jump": 2, "breakthrough of one revolution": 1, "tr
 
 
 def test_every_command_that_is_named_exists():
-    """In pages, and in docstrings and comments of the package."""
     root = Path(__file__).parents[1]
     for path in [*root.glob("*.md"), *root.glob("docs/**/*.md"), *root.glob("mdr_dask/**/*.py")]:
         for kind, argument in re.findall(r"python -m benchmarks (\w+)(?: (\w+))?", path.read_text()):

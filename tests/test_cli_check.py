@@ -113,7 +113,6 @@ def test_moduli_of_no_solid_are_asked_about(files, capsys):
 
 
 def test_columns_of_measured_points_leave_out_structures_where_nothing_else_is_called_so():
-    """With a unit of its own; a name that two structures have is written in full."""
     conditions = {"material_temperature": "K", "velocity": "m/s", "oil_density": "kg/m^3", "body_density": "kg/m^3"}
     text = "Temperature [°C];Velocity [mm/s];µ\n20;1;0,5\n40;10;0,6\n"
     output = {"friction_coefficient": "1"}

@@ -6,7 +6,6 @@ import time
 from dataclasses import replace
 
 import pytest
-from test_execute import run
 
 from mdr_dask import bars as shown
 from mdr_dask import compile_clock as clocks
@@ -98,14 +97,3 @@ def test_what_is_left_at_the_end_of_a_round_is_nothing(toy, url):
     assert len(rounds) > 1
     assert rounds == sorted(rounds)
     assert progress.finished == pytest.approx(progress.estimated)
-
-
-def test_a_run_tells_how_long_it_took(toy, url):
-    began = time.monotonic()
-    reported = []
-    progress = execute.run(toy.campaign(toy.axis("position", [1.0, 2.0])), url, execute.Resources(), reported.append)
-    assert all(0 <= each.wall_seconds < time.monotonic() - began for each in reported)
-    assert 0 < progress.wall_seconds < time.monotonic() - began
-    assert progress.compute_seconds + progress.write_seconds > 0
-    again = run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
-    assert (again.kept, again.done, again.solves, again.compute_seconds) == (12, 0, 0, 0.0)

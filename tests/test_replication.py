@@ -75,11 +75,7 @@ def coverage(at_least, tolerance, values):
 @pytest.mark.parametrize("tolerance", [0.04, 0.1])
 @pytest.mark.parametrize("at_least", [2, 5, 10, 20])
 def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, tolerance):
-    """4000 campaigns of scatter 0.2: 95 % intervals cover 94 % or more, within 3 sigma, whatever the first round.
-
-    Stopping early favours ensembles that happen to look narrow. That costs most where about 4 to 40 are needed, which
-    these tolerances ask for.
-    """
+    """Stopping early favours ensembles that happen to look narrow, mostly where 4 to 40 are needed, as here."""
     values = 1.0 + 0.2 * np.random.Generator(np.random.Philox(11)).standard_normal((CAMPAIGNS, 160))
     covered = coverage(at_least, tolerance, values)
     scatter = np.sqrt(0.94 * 0.06 / CAMPAIGNS)
@@ -87,10 +83,7 @@ def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, toleran
 
 
 def test_few_results_are_enough_if_each_states_its_scatter():
-    """Four revolutions that differ by 1 % and state that scatter: their mean is known to 0.5 %.
-
-    With a wrong statement, or a larger difference than stated, more are needed.
-    """
+    """Four revolutions that differ by 1 %, and state that scatter: their mean is known to 0.5 %."""
     four = np.array([0.99, 1.01, 1.0, 1.0])
     values = {"y": np.array([four, four, 1 + 30 * (four - 1), four])}
     status = np.full((4, 4), Status.DONE, dtype=np.int8)

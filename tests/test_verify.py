@@ -51,7 +51,6 @@ OF_SERIES = [("record of the layout", "truncate"), ("root metadata", "empty")]
     ],
 )
 def test_harm_is_named_and_mended(toy, whole, tmp_path, kind, harm, series):
-    """Every kind of file once."""
     draw = random.Random(f"{kind} {harm}")
     assert damage.faults(toy, *whole[series], tmp_path / "harmed.zarr", kind, harm, draw) == []
 

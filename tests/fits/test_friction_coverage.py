@@ -144,7 +144,6 @@ WRONG = {
         of_friction(lambda f, v: zone(f, v) * 2 ** (np.log(f / 0.055) / np.log(0.3 / 0.055)) ** 2),
         {"alpha": 0.2},
     ),
-    "stepped": Case("zone_one", ZONE, of_friction(lambda f, v: zone(f, v) * np.where(f > 0.05, 3, 1)), {"alpha": 0.2}),
     "kinked": Case(
         "interpolation", PLANE, of_friction(lambda f, v: plane(f, v) * np.where(v > 0.1, 0.6, 1)), {"alpha": 0.1}
     ),
@@ -153,12 +152,6 @@ WRONG = {
         CONE,
         of_friction(of_xi(lambda xi: laws.indenter(xi, 1.5) * np.where(xi > 0.1, 1.0, 2.0))),
         {"exponent": 0.3},
-    ),
-    "growth": Case(
-        "contact_growth",
-        ZONE,
-        {"contact_fraction": lambda f, _: 0.3 * f**0.6 * (1 + 3 * (f > 0.05))},
-        {"exponent": 0.1},
     ),
     "slope": Case(
         "contact_slope",

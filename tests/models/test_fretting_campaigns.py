@@ -68,7 +68,6 @@ def test_units_in_the_store(write, parameters, units):
 
 
 def test_profiles_over_a_length_are_those_over_the_contact_radius(write):
-    """They had no unit and could not be compared with measured profiles."""
     forces = STEEL.replace("50 N", "[50 N, 100 N]") + "  points: 9\n"
     outputs = "outputs: [worn_profile, worn_image]\n"
     data = filled(write(forces + "  last_radius: 0.2 mm\n", outputs)).isel(realisation=0)

@@ -165,7 +165,6 @@ def test_friction_is_that_of_asperities_and_film():
 
 @pytest.mark.parametrize("formula", ["pan_hamrock", "ehl"])
 def test_the_film_is_never_thinner_for_its_asperities(formula):
-    """Without asperities, the film carries the whole load."""
     speeds = [1.0, 10.0, 100.0, 1000.0]
     rough = stribeck(speeds, film_formula=formula)
     smooth = stribeck(speeds, film_formula=formula, rms_roughness=1e-12)

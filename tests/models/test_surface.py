@@ -11,8 +11,6 @@ from mdr_dask.errors import CampaignError, DataError
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.surface import Surface, lines_of, spectra_of
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.models.velocity_jump import MODEL as JUMP
-from mdr_dask.models.velocity_jump import VelocityJump
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
 LENGTH, POINTS = 0.02, 400
@@ -55,16 +53,6 @@ def test_a_table_of_the_power_law_is_the_generated_line(tmp_path, hurst):
         np.testing.assert_allclose(found.values["rms_slope"], wanted["rms_slope"], rtol=1e-12)
         for name in ("friction_coefficient", "indentation_depth", "contact_fraction"):
             np.testing.assert_allclose(found.values[name], wanted[name], rtol=1e-9)
-
-
-def test_the_jump_slides_on_the_same_line(tmp_path):
-    one = {"velocity_change": 0.5, "relaxation_times": (0.1, 1.0, 5.0), "length": LENGTH}
-    generated = one | {"rms_roughness": 1e-6, "longest_wavelength": LONGEST}
-    wanted = solved(JUMP, VelocityJump, realisations=(0,), **generated).values
-    surface = {"spectrum": table(tmp_path / "road.csv")}
-    found = solved(JUMP, VelocityJump, realisations=(0,), surface=surface, **one)
-    assert np.all(found.status == Status.DONE), found.messages
-    np.testing.assert_allclose(found.values["friction_coefficient"], wanted["friction_coefficient"], rtol=1e-9)
 
 
 def test_each_realisation_takes_one_of_several_files(tmp_path):

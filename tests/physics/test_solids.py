@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mdr_dask.physics.solids import (
     arrhenius_factor,
@@ -13,7 +11,6 @@ from mdr_dask.physics.solids import (
     kelvin,
     power_law_series,
     prony,
-    recovery,
     relaxation_modulus,
     standard_solid,
     wlf_factor,
@@ -57,35 +54,6 @@ def test_impossible_solids_are_refused(arguments, message):
         prony(*arguments)
     with pytest.raises(ValueError, match="glass modulus must not be below"):
         standard_solid(2.0, 1.0, 1.0)
-
-
-@settings(max_examples=30, deadline=None)
-@given(
-    st.lists(
-        st.tuples(st.floats(-10, 10), st.floats(-6, 6)),
-        min_size=1,
-        max_size=50,
-        unique_by=lambda term: round(term[0], 1),
-    )
-)
-def test_recovery_modes_interlace_and_invert(terms):
-    decades, stiffness = np.array(sorted(terms)).T
-    times, moduli = 10**decades, 10**stiffness
-    modes = recovery(moduli, times)
-    assert np.all(modes.times >= times)
-    assert np.all(modes.times[:-1] <= times[1:])
-    # every mode is free of stress: 1 + sum G stretch = 0, to rounding of the largest term
-    largest = 1 + np.max(np.abs(moduli[:, None] * modes.stretch), axis=0)
-    assert np.all(np.abs(1 + moduli @ modes.stretch) <= 1e-9 * largest)
-    # rounding of sums over twenty decades
-    identity = modes.amplitude @ modes.stretch
-    magnitude = np.abs(modes.amplitude) @ np.abs(modes.stretch) + 1
-    assert np.max(np.abs(identity - np.eye(times.size)) / magnitude) < 1e-9
-
-
-def test_recovery_of_a_standard_solid_is_its_retardation_time():
-    modes = recovery(np.array([9.0]), np.array([0.1]))
-    assert modes.times[0] == pytest.approx(0.1 * 10, rel=ROUNDING)  # tau G_glass / G_inf
 
 
 @pytest.mark.parametrize("exponent", [0.05, 0.1, 0.3, 0.5, 0.9])

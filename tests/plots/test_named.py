@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from overlaps import problems
 
 from mdr_dask import aggregation
-from mdr_dask.errors import DataError, FitError
+from mdr_dask.errors import DataError
 from mdr_dask.plots import available, history, page
 from mdr_dask.units import conversion
 
@@ -122,15 +122,6 @@ def test_a_missing_output_is_named_and_leaves_no_empty_panel(tmp_path):
         available("fretting_wear")["wear_growth"].describe({"": groups[""].drop_vars("wear_volume")})
 
 
-def test_failed_results_are_counted(tmp_path):
-    groups = planted.make(tmp_path, planted.SLIDING + F + V, failed=True)
-    figure = available("sliding_friction")["velocity"].describe(groups)
-    failed = int((groups[""]["status"] == 3).sum())
-    assert f"{failed} of {groups['']['status'].size} results of the store, which failed" in figure.left_out
-    marks = {trace.what: trace.column("x").size for trace in figure.panels[0].traces if trace.kind == "absent"}
-    assert marks == {"failed": 1, "mean without realisations that failed": 1}
-
-
 def test_a_history_shows_friction_velocity_and_force_as_prescribed(tmp_path):
     steps = "  protocol: {shape: steps, times: [0 s, 2 ms], velocities: [0.1 m/s, 0.05 m/s], forces: [0.2 N, 0.1 N]}\n"
     text = planted.JUMP + "  normal_force: 0.1 N\n  velocity: 0.05 m/s\n" + steps
@@ -172,8 +163,3 @@ def test_a_master_curve_has_the_units_of_the_other_figures(stores):
     assert factors.x.label == known["velocity"].describe(groups).panels[0].x.label
     drawn = np.unique(np.concatenate([trace.column("x") for trace in measured.traces]).round(6))
     np.testing.assert_allclose(drawn, [10, 1000, 100000])
-
-
-def test_a_calibration_without_a_table_says_so(stores):
-    with pytest.raises(FitError, match="expected a table of measurements"):
-        available("velocity_jump")["calibration"].describe(stores(JUMP))

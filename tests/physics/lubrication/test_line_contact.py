@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -93,21 +94,10 @@ def test_flow_is_the_same_everywhere() -> None:
     assert changes[1] < 0.01
 
 
-def _heavy() -> list[tuple[LineContact, float, float]]:
-    rows = csv.DictReader(line for line in HEAVY.read_text().splitlines() if not line.startswith("#"))
-    cases = []
-    for row in rows:
-        numbers = tuple(float(row[name]) for name in ("W", "U", "G"))
-        viscosity = float(row["viscosity"]) if row["viscosity"] else None
-        case = line_contact(
-            numbers,
-            E_STAR,
-            viscosity_law=row["viscosity_law"],
-            viscosity=viscosity,
-            compressible=row["compressible"] == "true",
-        )
-        cases.append((case, float(row["central_film"]), float(row["minimum_film"])))
-    return cases
+def _heavy() -> Iterator[tuple[LineContact, float, float]]:
+    for row in pd.read_csv(HEAVY, comment="#").replace({np.nan: None}).itertuples():
+        options = {"viscosity_law": row.viscosity_law, "viscosity": row.viscosity, "compressible": row.compressible}
+        yield line_contact((row.W, row.U, row.G), E_STAR, **options), row.central_film, row.minimum_film
 
 
 def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy() -> None:

@@ -34,34 +34,6 @@ def test_exact_curves_give_exact_factors():
     assert result.horizontal[3] == result.horizontal_error[3] == 0
 
 
-SHAPES = {
-    "sigmoid": sigmoid,
-    "nearly straight": lambda x: 0.5 * x + 0.02 * x**2,
-    "bump": lambda x: np.exp(-(x**2) / 2),
-    "power": lambda x: 0.3 * x,
-    "plateau": lambda x: -0.2 * np.logaddexp(0, -3 * x),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("shape", "vertical"), [*((shape, "none") for shape in SHAPES), ("sigmoid", "free")])
-def test_intervals_of_95_percent_hold_the_factors(shape, vertical):
-    """10 families of 5 factors, whose errors are correlated: the standard deviation of their share is some 0.05."""
-    held, ratios = [], []
-    for seed in range(10):
-        rise = 0.02 * (vertical == "free")
-        groups, pieces, shifts, heights = family(seed, shape=SHAPES[shape], rise=rise)
-        result = superpose(groups, pieces, vertical)
-        low, high = result.interval()
-        truth = np.append(shifts, heights)[: groups.size * (1 + (vertical == "free"))]
-        free = high[: truth.size] > low[: truth.size]
-        low, high, truth = low[: truth.size][free], high[: truth.size][free], truth[free]
-        held += list((low <= truth) & (truth <= high))
-        ratios += list(np.abs(truth - (low + high) / 2) / (high - low) * 2)
-    assert np.mean(held) >= 0.85
-    assert np.max(ratios) < 3
-
-
 def test_a_melt_is_shifted_by_both_moduli_with_b_t_and_offsets():
     """Horizontally alone, G' of such curves gives intervals that miss by several half widths."""
     kelvins, curves, factors, _ = of_a_polymer(3, np.random.default_rng((3, 1)))

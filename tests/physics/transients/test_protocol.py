@@ -52,15 +52,6 @@ def jump(
     return moments, found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("load", [1e-3, 0.04])
-def test_a_light_load_has_a_steady_start(load: float) -> None:
-    state, depth, status = steady_start(periodic_line(*rough()), KELVIN, 0.05, load)
-    assert status == Outcome.CONVERGED
-    assert state.displacement.mean() == pytest.approx(load, rel=1e-6)
-    assert np.isfinite(depth)
-
-
 def at_times(line: CubicLine, solid: Foundation, deborahs: tuple[float, float], cells: float = 0.5) -> np.ndarray:
     """Return the drag at 0+ and at `TIMES`."""
     moments, found = jump(line, solid, deborahs, 0.3, 1.5, cells)

@@ -65,13 +65,11 @@ def test_little_wear_is_of_the_first_order(exponent, c, accuracy):
 
 @pytest.mark.parametrize("exponent", [0.6, 1.0, 1.4])
 def test_a_sharp_tip_is_worn_to_the_accuracy_asked(exponent):
-    """The tip of r^0.6 was worn by a tenth less than it is: panels at the axis were those of a parabola."""
     rough, fine = (exact(PowerProfile(exponent), 0.0, [0.1], one, errors=False)[0] for one in (1e-3, 1e-4))
     assert abs(rough.worn_depth / fine.worn_depth - 1.0) < 0.01
 
 
 def test_a_step_that_leaves_the_numbers_fails_without_a_warning():
-    """An infinite residual was differentiated; every warning is an error here."""
     (worn,) = exact(PowerProfile(6.804484763820827), 0.9977872552149678, [14.4], 1e-4, constant_force=True)
     assert worn.depth > 1.0
 
@@ -80,7 +78,6 @@ def test_a_step_that_leaves_the_numbers_fails_without_a_warning():
 @pytest.mark.parametrize("hold", ["depth", "force"])
 @pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.455), (1.0, 0.4), (3.0, 0.6)])
 def test_estimates_of_histories_hold_before_and_after_the_image_jumps(exponent, c, hold):
-    """Half of the cells were the only judge, and told a quarter of the error at N = 8."""
     profile, eta, force = PowerProfile(exponent), 1.0 - c**exponent, 2.0 * exponent / (exponent + 1.0)
     kept = {"depth": 1.0} if hold == "depth" else {"force": force}
     blocks = [LoadBlock(cycles, eta, **kept) for cycles in (0.3, 1.7, 6.0)]

@@ -115,7 +115,6 @@ def test_after_many_cycles_the_contact_is_the_limit(exponent, c, constant_force)
 )
 @pytest.mark.parametrize("constant_force", [False, True])
 def test_sharp_and_steep_bodies_wear_at_every_resolution(exponent, c, cycles, constant_force):
-    """The rise of the plateau was left out where the border had moved back, and tiny slip was interpolated."""
     (worn,) = exact(PowerProfile(exponent), c, [cycles], 1e-2, constant_force=constant_force)
     assert len(worn.rougher) == 2
     assert worn.energy_volume == pytest.approx(worn.wear_volume, abs=1e-2)

@@ -39,6 +39,5 @@ CONTACTS = {
 @pytest.mark.parametrize(("exponent", "c"), [(1.0, 0.2), (2.0, 0.455), (6.0, 0.8)])
 @pytest.mark.parametrize("name", CONTACTS)
 def test_pressure_is_the_normal_force(name, exponent, c):
-    """At the end under constant force the jump at the border was counted twice, as border and as edge."""
     contact = CONTACTS[name](PowerProfile(exponent), c)
     assert pressed(contact, contact.contact_radius) == pytest.approx(contact.normal_force, rel=1e-3)

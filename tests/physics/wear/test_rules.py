@@ -125,18 +125,6 @@ def test_the_fast_rule_by_quadrature(exponent, cycles, c):
         np.testing.assert_allclose([float(part) for part in found], expected, rtol=2e-6)  # the stated relative error
 
 
-def test_table_of_a_parabola_wears_as_the_parabola():
-    r = np.linspace(0, 3, 301)
-    table = from_table(r, r**2 / 2, 1.0)
-    exact, measured = wear.limit(PARABOLA, 0.455), wear.limit(table, 0.455)
-    assert measured.contact_radius == pytest.approx(exact.contact_radius, rel=1e-8)
-    assert measured.wear_volume == pytest.approx(exact.wear_volume, rel=1e-8)
-    some = np.array([0.2, 0.7, 1.1])
-    np.testing.assert_allclose(
-        wear.fast(table, 0.455, 4.0).height(some), wear.fast(PARABOLA, 0.455, 4.0).height(some), atol=1e-8
-    )
-
-
 def test_scar_beyond_the_table():
     r = np.linspace(0, 1.1, 60)
     with pytest.raises(ValueError, match="beyond the table"):

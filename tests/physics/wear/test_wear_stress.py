@@ -80,16 +80,6 @@ def test_tables_wear_as_their_formula(exponent, c, cycles):
         assert measured.contact_radius == pytest.approx(formula.contact_radius, abs=1e-3)
 
 
-@pytest.mark.parametrize("exponent", [0.7, 1.0, 2.0, 5.0, 10.0])
-@pytest.mark.parametrize("constant_force", [False, True])
-def test_sliding(exponent, constant_force):
-    """The worn volume is the force times the path."""
-    for slid in exact(PowerProfile(exponent), 0.0, [1e-3, 1.0, 30.0], constant_force=constant_force, accuracy=1e-3):
-        assert slid.wear_volume == slid.energy_volume
-        assert slid.contact_radius >= 1.0
-        assert np.all(np.isfinite(slid.pressure(np.linspace(0.0, 2.0, 50))))
-
-
 @pytest.mark.parametrize(
     ("exponent", "c"),
     [(0.3, 0.98), (0.5, 0.1), (1.0, 0.05), (2.0, 0.05), (2.0, 0.99), (3.0, 0.2), (5.0, 0.4), (8.0, 0.5), (20.0, 0.99)],
