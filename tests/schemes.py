@@ -6,8 +6,15 @@ import numpy as np
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import steady, viscoelastic
+from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
+
+
+def rough_line(points, oversampling, hurst=0.7, seed=3, realisation=1):
+    """Return heights and slopes of a generated line, on some nodes for each point."""
+    amplitude, phase = roughness.amplitudes(points // 2, hurst), roughness.phases(seed, realisation, points // 2)
+    return tuple(roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1))
 
 
 def on_line(height, slope, deborah, loads, scheme="hermite", **options):

@@ -10,10 +10,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks import __main__ as command
-from benchmarks import accuracy, campaigns, high_speed, peers
+from benchmarks import accuracy, campaigns, peers
 from benchmarks.rows import read
 from benchmarks.solvers import SOLVERS
-from benchmarks.surfaces import persson, road, validity
+from benchmarks.surfaces import validity
 
 #: Random cases of each family; more where a case takes milliseconds.
 CASES = {"wear": 2, "velocity jump": 2, "breakthrough of one revolution": 1, "transforms": 20, "levels of a jump": 20}
@@ -71,28 +71,3 @@ def test_solvers_are_compared_with_the_peers_that_are_installed(subject):
     rows = list(importlib.import_module(f"benchmarks.peers.{subject}").compared())
     assert {row.solver for row in rows} <= set(peers.ABOUT)
     assert all(row.error < 0.1 for row in rows if row.method == peers.OURS)
-
-
-@pytest.mark.slow
-def test_lines_are_compared_with_perssons_theory(monkeypatch, capsys):
-    for name, value in {"LINES": 2, "VELOCITIES": (1.0,), "PRESSURES": (0.03,)}.items():
-        monkeypatch.setattr(persson, name, value)
-    persson.main()
-    ratios = [float(row.split("|")[-2]) for row in capsys.readouterr().out.splitlines()[2:]]
-    assert len(ratios) == 4
-    assert all(0.05 < ratio < 2 for ratio in ratios)
-
-
-@pytest.mark.slow
-def test_the_road_is_made(monkeypatch, tmp_path):
-    monkeypatch.setattr(road, "POINTS", 128)
-    road.main(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} >= {"road.csv", "road-spectrum.png", "road0.npy"}
-
-
-@pytest.mark.slow
-def test_friction_at_high_speed_is_drawn(monkeypatch, tmp_path):
-    for name, value in {"LINES": 1, "POINTS": 100, "DEBORAH": np.geomspace(1e-3, 1e2, 4)}.items():
-        monkeypatch.setattr(high_speed, name, value)
-    high_speed.main(str(tmp_path / "high.png"))
-    assert (tmp_path / "high.png").exists()

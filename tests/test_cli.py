@@ -86,18 +86,6 @@ def test_status_counts_and_lists_failures(filled, capsys):
     assert capsys.readouterr().out == "no failures\n"
 
 
-@pytest.mark.parametrize("suffix", [".nc", ".zarr", ".csv"])
-def test_aggregates_are_written_to_files(filled, tmp_path, capsys, suffix):
-    path = tmp_path / f"means{suffix}"
-    assert main(["aggregate", filled, "-o", str(path)]) == 0
-    if suffix == ".csv":
-        assert "friction_coefficient_mean" in path.read_text().splitlines()[0]
-    else:
-        opened = xr.open_dataset(path, engine="h5netcdf" if suffix == ".nc" else "zarr")
-        assert opened.friction_coefficient_interval.sizes["bound"] == 2
-        opened.close()
-
-
 def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "mdr_dask", *arguments]
 

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import planted
 import pytest
 import xarray as xr
@@ -56,20 +55,6 @@ def test_a_table_can_be_given_to_a_calibration_and_to_nothing_else(store, capsys
     assert found["normal_force_low"] < force < found["normal_force_high"]
     assert main(["fit", store, "plateau", "--measured", "rig.csv"]) == 2
     assert "--measured and --plot can be used only with `calibration`" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_a_master_curve_of_a_store_is_that_of_its_table(store, capsys):
-    """Friction against velocity at each force, from the store and from a table of its means."""
-    data = xr.open_zarr(store)
-    mean = data["friction_coefficient"].mean("realisation").to_series()
-    rows = [f"{force},{velocity},{mu}" for (force, velocity), mu in mean.items()]
-    Path("means.csv").write_text("\n".join(["normal_force,velocity,mu", *rows]))
-    found = []
-    for source in (store, "means.csv"):
-        assert main(["master-curve", source, "--over", "velocity", "--by", "normal_force", "--json"]) == 0
-        found.append(json.loads(capsys.readouterr().out)["data_vars"]["shift_factor"]["data"])
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-6, atol=1e-9)
 
 
 def test_an_interrupted_command_reports_that_results_are_kept(monkeypatch, capsys):

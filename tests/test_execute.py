@@ -148,9 +148,7 @@ def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
     run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
     before = digests(url), (Path(url) / "zarr.json").read_bytes()
     other = replace(toy.campaign(toy.axis("position", [1.0, 2.0]), noise=0.75), seed=5)
-    with pytest.raises(
-        StoreError, match=r"seed: 1 in the store, 5 .*\n +noise: 0.5 in the store, 0.75 in the campaign"
-    ):
+    with pytest.raises(StoreError, match=r"seed: 1 in the store, 5 .*\n +noise: 0.5 in the store, 0.75"):
         run(other, url)
     with pytest.raises(StoreError, match=r"axes: \['position'\] in the store, \['slope'\] in the campaign"):
         run(toy.campaign(toy.axis("slope", [1.0])), url)

@@ -77,9 +77,7 @@ def test_fewer_outputs_go_on_with_the_stored_ones_and_more_are_refused(toy, url)
     assert run(fewer, url).done == 6
     assert np.isfinite(values(url, "trace")).all()
     run(fewer, url + "2")
-    with pytest.raises(
-        StoreError, match=r"outputs: the store lacks trace, for which every case would be computed again"
-    ):
+    with pytest.raises(StoreError, match="outputs: the store lacks trace"):
         run(both, url + "2")
 
 
@@ -120,9 +118,7 @@ def test_a_series_named_like_an_array_at_the_root_and_a_study_beside_series_are_
         run(series, url)
     assert digests(url) == before
     run(series, url + "2")
-    with pytest.raises(
-        StoreError, match="series: height in the store, none in the campaign: give this one a named series"
-    ):
+    with pytest.raises(StoreError, match="series: height in the store, none in the campaign"):
         run(plain, url + "2")
 
 

@@ -88,9 +88,7 @@ def test_workbooks_are_read_sheet_by_sheet():
     read = read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", DMA)
     np.testing.assert_allclose(read["temperature"], [293.15, 293.15, 313.15, 313.15])
     np.testing.assert_allclose(read["storage modulus"], [5.5e6, 6.5e6, 5.5e6, 6.5e6])
-    with pytest.raises(
-        DataError, match=r"(?m)^dma.xlsx: sheet '20 C', row 4: column storage modulus: expected .*'5.5 MPa'"
-    ):
+    with pytest.raises(DataError, match=r"dma.xlsx: sheet '20 C', row 4: column storage modulus: expected"):
         read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", [Column("storage modulus", "Pa", above=5.6e6)])
     with pytest.raises(DataError, match="expected a table or an Excel workbook"):
         decoded(b"PK\x03\x04 nothing of the kind", "dma.xlsx")

@@ -125,9 +125,7 @@ def test_shared_solutions_are_counted(toy, costs):
 def test_huge_studies_are_refused_series_by_series(toy):
     campaign = study(toy, (100, 100), 10**6)
     near, far = (replace(campaign.series[0], name=name) for name in ("near", "far"))
-    with pytest.raises(
-        CampaignError, match=r"series\.near: expected at most 1e\+09 results, got 100 position x 100"
-    ) as e:
+    with pytest.raises(CampaignError, match=r"series\.near: expected at most 1e\+09 results") as e:
         plan.templates(replace(campaign, series=(near, far)), 10**6)
     assert len(e.value.args) == 2
 

@@ -180,9 +180,7 @@ def test_a_study_without_a_table_half_filled_or_sampled_is_refused():
         calibration({"": study()})
     table_ = {"name": "rig.csv", "text": RIG}
     half = study().where(study()["relaxation_time"] < 1e-3).assign_attrs(measured=table_)
-    with pytest.raises(
-        FitError, match=r"mu: \d+ of the \d+ values that are needed to compare the study with rig.csv are missing"
-    ):
+    with pytest.raises(FitError, match=r"mu: \d+ of the \d+ values .* rig.csv are missing"):
         calibration({"": half})
     sampled = study().stack(case=[*AXES]).reset_index("case").assign_attrs(measured=table_)
     with pytest.raises(FitError, match="expected a grid"):

@@ -17,9 +17,8 @@ def film_exponents(series: dict[str, xr.Dataset]) -> xr.Dataset:
     return FIT.results(series)[next(iter(series))]
 
 
-def power_law(W: np.ndarray, U: np.ndarray, G: np.ndarray, scatter: float = 0.0) -> xr.Dataset:
+def power_law(W: np.ndarray, U: np.ndarray, G: np.ndarray) -> xr.Dataset:
     film = 2.922 * W[:, None, None] ** -0.166 * U[None, :, None] ** 0.692 * G[None, None, :] ** 0.47
-    film = film * np.exp(scatter * np.random.default_rng(7).normal(size=film.shape))
     dims = ("load_parameter", "speed_parameter", "material_parameter")
     return xr.Dataset(
         {"central_film": ((*dims, "realisation"), film[..., None])},

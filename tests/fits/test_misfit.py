@@ -25,9 +25,8 @@ def test_noise_has_a_trend_as_often_as_its_probability(count):
     for level in (0.05, 0.2, 0.5):
         below, spread = np.mean(found < level), 4 * np.sqrt(level * (1 - level) / DRAWS)
         assert below < level + spread
-        assert (
-            below > (level if count == 1 else 0.6 * level) - spread
-        )  # for three independent conditions, it is 1 - (1 - level / 3)^3
+        # for three independent conditions, it is 1 - (1 - level / 3)^3
+        assert below > (level if count == 1 else 0.6 * level) - spread
     assert np.mean(found == 1) == pytest.approx(0.0 if count == 1 else (2 / 3) ** 3, abs=4 * np.sqrt(0.21 / DRAWS))
 
 

@@ -40,9 +40,7 @@ def test_one_kind_and_one_law_only():
         material()
     with pytest.raises(ValidationError, match="got kelvin, standard_solid"):
         material(kelvin=kelvin, standard_solid=solid)
-    with pytest.raises(
-        ValidationError, match="expected a temperature together with one of wlf, arrhenius, shift_factors"
-    ):
+    with pytest.raises(ValidationError, match="expected a temperature together with one of wlf"):
         material(kelvin=kelvin, temperature=300.0)
     laws = {
         "wlf": {"c1": 17.4, "c2": 51.6, "reference": 300.0},

@@ -132,7 +132,7 @@ def test_impossible_parameters_are_refused(change: dict[str, object], message: s
 def test_depth_of_a_jump_comes_from_the_march() -> None:
     """The depth begins and ends at the steady depths, and agrees with the solution for any history."""
     found = compute(of_line({}, relaxation_times=(0.0, 0.5, 20.0), velocity_change=-0.5)).values["indentation_depth"]
-    steady = [compute_friction(v).values["indentation_depth"][0] for v in (0.05, 0.025)]
+    steady = [compute_friction(1e-4, (0, 3), velocity=v).values["indentation_depth"][0] for v in (0.05, 0.025)]
     assert np.allclose(found[0, :, 0], steady[0], rtol=1e-4)
     assert np.allclose(found[0, :, 2], steady[1], rtol=1e-4)
     step = {"shape": "steps", "times": [0.0], "velocities": [0.025]}
@@ -140,11 +140,11 @@ def test_depth_of_a_jump_comes_from_the_march() -> None:
     assert np.allclose(found, followed.values["indentation_depth"], rtol=2e-4)
 
 
-def compute_friction(velocity: float) -> Result:
+def compute_friction(accuracy: float, realisations: tuple[int, ...], **case: object) -> Result:
     """Solve steady sliding of the same body."""
-    shared = {name: value for name, value in LINE.items() if name != "relaxation_times"}
-    steady = SlidingFriction.model_validate(shared | {"velocity": velocity})
-    return sliding.compute(Block(steady, {}, 1, (0, 3), 5, ("friction_coefficient", "indentation_depth"), 1e-4))
+    shared = {k: v for k, v in (LINE | case).items() if k not in ("relaxation_times", "velocity_change")}
+    outputs = ("friction_coefficient", "indentation_depth")
+    return sliding.compute(Block(SlidingFriction.model_validate(shared), {}, 1, realisations, 5, outputs, accuracy))
 
 
 def random_jump(seed: int) -> dict[str, object]:
@@ -173,11 +173,7 @@ def test_ends_are_the_steady_solvers(seed: int) -> None:
     case = random_jump(seed)
     found = compute(Block(parameters(**case), {}, 1, (seed,), 5, MODEL.with_companions(ENDS), 0.01)).values
     for name, change in (("before", 0.0), ("after", case["velocity_change"])):
-        shared = {
-            key: value for key, value in (LINE | case).items() if key not in ("relaxation_times", "velocity_change")
-        }
-        steady = SlidingFriction.model_validate(shared | {"velocity": case["velocity"] * (1 + change)})
-        truth = sliding.compute(Block(steady, {}, 1, (seed,), 5, ("friction_coefficient",), 1e-5))
+        truth = compute_friction(1e-5, (seed,), **case | {"velocity": case["velocity"] * (1 + change)})
         exact = truth.values["friction_coefficient"][0, 0]
         assert found[f"friction_coefficient_{name}"][0, 0] == pytest.approx(exact, rel=0.01)
 

@@ -116,22 +116,6 @@ def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy() -> None:
     assert np.max(np.array(errors) / np.array(stated)) < 3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("law", ["barus", "roelands"])
-@pytest.mark.parametrize("W", [2e-6, 5e-4])
-@pytest.mark.parametrize("U", [1e-13, 1e-9])
-@pytest.mark.parametrize("G", [500.0, 8000.0])
-def test_every_corner_and_middle_of_the_box_converges(W: float, U: float, G: float, law: str) -> None:
-    found = solve_film(line_contact((W, U, G), E_STAR, viscosity_law=law, viscosity=0.08))
-    assert found.outcome == Outcome.CONVERGED, found.reason
-    assert found.reason == ""
-    assert found.error <= 1e-3
-    assert found.finest.film.min() > 0
-    assert found.finest.pressure.min() >= 0
-    assert found.load_error < 1e-10
-    assert found.minimum_film.value <= found.central_film.value * (1 + 1e-4)
-
-
 @pytest.mark.parametrize(("W", "U", "G"), [(2e-5, 1e-11, 5000.0), (1e-4, 1e-10, 2500.0), (3e-6, 1e-12, 1000.0)])
 def test_only_moes_numbers_count_without_density(W: float, U: float, G: float) -> None:
     """The same M and L from other W, U, G: the film in units of R sqrt(2 U) is the same."""

@@ -75,8 +75,8 @@ def test_tilt_and_bow_are_taken_off(order):
     np.testing.assert_allclose(without_trend(bent, order).height, without_trend(heights, order).height, atol=1e-15)
 
 
-def test_missing_points_and_spikes_are_filled():
-    """2 % lost in clusters and 30 spikes change rms height and gradient by a few per cent; more are refused."""
+def test_missing_points_are_filled():
+    """2 % lost in clusters change rms height and gradient by a few per cent; more than 5 % are refused."""
     heights, _ = surface()
     known = spectrum_of_map(heights, hann=False)
     damaged = heights.height.copy()
@@ -86,15 +86,6 @@ def test_missing_points_and_spikes_are_filled():
     mended = spectrum_of_map(filled(SurfaceMap(damaged, heights.size)), hann=False)
     assert mended.rms_height == pytest.approx(known.rms_height, rel=0.01)
     assert mended.rms_gradient == pytest.approx(known.rms_gradient, rel=0.05)
-    spikes = heights.height.copy()
-    places = np.argwhere(np.indices((256, 256)).sum(axis=0) == 251)[3:-3:8]
-    spikes[places[:, 0], places[:, 1]] += 2e-5
-    far = outliers(SurfaceMap(spikes, heights.size))
-    assert set(map(tuple, np.argwhere(far))) == set(map(tuple, places))
-    assert spectrum_of_map(SurfaceMap(spikes, heights.size), hann=False).rms_gradient > 2 * known.rms_gradient
-    spikes[far] = np.nan
-    mended = spectrum_of_map(filled(SurfaceMap(spikes, heights.size)), hann=False)
-    assert mended.rms_gradient == pytest.approx(known.rms_gradient, rel=0.01)
     damaged[: int(256 * MOST_MISSING) + 1] = np.nan
     with pytest.raises(DataError, match="expected at most 5 % of missing points"):
         filled(SurfaceMap(damaged, heights.size))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from references.largest_displacement import judged, marched, searched_afresh
+from schemes import rough_line
 
-from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.patches import LOAD
@@ -15,9 +15,7 @@ EVERY_MOMENT = 1000
 
 
 def rough(points: int, hurst: float, oversampling: int = 4, seed: int = 7) -> PreparedLine:
-    amplitude, phase = roughness.amplitudes(points // 2, hurst), roughness.phases(seed, 1, points // 2)
-    nodes = points * oversampling
-    return PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
+    return PreparedLine.of(periodic_line(*rough_line(points, oversampling, hurst, seed)))
 
 
 @pytest.mark.parametrize("ratio", [0.2, 10.0])

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from schemes import on_line
+from schemes import on_line, rough_line
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.foundation import KELVIN
 from mdr_dask.physics.transients.elements.loading_history import Piece, trace
@@ -20,31 +19,17 @@ TIMES = np.geomspace(1e-3, 20, 30)
 WAVENUMBER = np.pi * POINTS
 
 
-def line(hurst: float = 0.7, realisation: int = 1, oversampling: int = OVERSAMPLING) -> tuple[np.ndarray, np.ndarray]:
-    amplitude = roughness.amplitudes(POINTS // 2, hurst)
-    phase = roughness.phases(3, realisation, POINTS // 2)
-    nodes = POINTS * oversampling
-    return roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+def line(oversampling: int = OVERSAMPLING) -> tuple[np.ndarray, np.ndarray]:
+    return rough_line(POINTS, oversampling)
 
 
-def solved(
-    height: np.ndarray,
-    slope: np.ndarray,
-    load: float,
-    deborah: tuple[float, float],
-    times: np.ndarray,
-    per_decade: float = 24,
-    accuracy: float = 0.0,
-    wavenumber: float = WAVENUMBER,
-) -> Jump:
-    return velocity_jump(
-        periodic_line(height, slope), load, deborah, MarchRequest(times, wavenumber, per_decade, accuracy)
-    )
+def solved(height, slope, load, deborahs, times, per_decade=24, wavenumber=WAVENUMBER) -> Jump:
+    request = MarchRequest(times, wavenumber, per_decade, 0.0)
+    return velocity_jump(periodic_line(height, slope), load, deborahs, request)
 
 
-def jump(change: float = 0.2, per_decade: float = 24, load: float = LOAD, oversampling: int = OVERSAMPLING) -> Jump:
-    height, slope = line(oversampling=oversampling)
-    return solved(height, slope, load, (DEBORAH, DEBORAH * (1 + change)), TIMES, per_decade)
+def jump(change: float = 0.2, per_decade: float = 24, oversampling: int = OVERSAMPLING) -> Jump:
+    return solved(*line(oversampling), LOAD, (DEBORAH, DEBORAH * (1 + change)), TIMES, per_decade)
 
 
 @pytest.mark.parametrize("change", [0.2, -0.2])

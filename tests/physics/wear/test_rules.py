@@ -49,17 +49,6 @@ def test_limit_leaves_no_step_and_conserves_volume(exponent, c):
     assert worn.wear_volume == pytest.approx(quad(ring, c, a, epsabs=1e-11)[0], rel=1e-6)  # the root at c limits quad
 
 
-def test_image_beyond_the_scar_restores_the_virgin_profile():
-    worn = wear.limit(PARABOLA, 0.455)
-    a = worn.contact_radius
-    r = np.array([1.3, 2.0])
-    # f = f0 outside, from g over the whole line
-    from mdr_dask.physics.mdr.transforms import inverse_transform
-
-    f = inverse_transform(lambda x: worn.image(x.ravel()).reshape(x.shape), r, breaks=[0.455, a], tolerance=1e-7).value
-    np.testing.assert_allclose(f, r**2 / 2, atol=2e-6)  # a root singularity at a limits the Gauss rule
-
-
 def test_limit_pressure_lives_on_the_stick_area_only():
     worn = wear.limit(PARABOLA, 0.455)
     p = worn.pressure(np.array([0.1, 0.3, 0.5, 0.9]))
