@@ -1,11 +1,13 @@
 """What becomes of a store when its campaign changes."""
 
 import shutil
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import toy
 import xarray as xr
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -173,11 +175,7 @@ class StoreAgainstDict(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        import tempfile
-
         self.patch = pytest.MonkeyPatch()
-        import toy
-
         self.toy = toy
         toy.register(self.patch)
         self.folder = Path(tempfile.mkdtemp())

@@ -162,6 +162,14 @@ MISBEHAVIOUR = {
 }
 
 
+def reason_of_failures():
+    """Run the campaign, in which every fifth result fails, and return the only reason."""
+    outcome = execute.run(mdr_dask.read("pin.yaml"), "pin.zarr", Resources(threads=1), lambda _: None)
+    assert (outcome.done, outcome.failed) == (160, 40)
+    (text,) = {each["message"] for each in messages("pin.zarr", "", xr.open_zarr("pin.zarr"))}
+    return text
+
+
 @pytest.mark.parametrize("kind", MISBEHAVIOUR)
 def test_a_case_without_a_proper_result_has_failed_and_the_others_go_on(example, monkeypatch, kind):
     misbehave, why = MISBEHAVIOUR[kind]
@@ -173,16 +181,14 @@ def test_a_case_without_a_proper_result_has_failed_and_the_others_go_on(example,
         return misbehave(outputs["wear_volume"]) if case.normal_force > 50 else outputs
 
     monkeypatch.setattr(module, "MODEL", replace(module.MODEL, compute=per_case(compute)))
-    campaign = mdr_dask.read("pin.yaml")
-    outcome = execute.run(campaign, "pin.zarr", Resources(threads=1), lambda _: None)
-    assert (outcome.done, outcome.failed) == (160, 40)
-    opened = xr.open_zarr("pin.zarr")
-    (text,) = {each["message"] for each in messages("pin.zarr", "", opened)}
+    text = reason_of_failures()
     assert re.match(f"([a-zA-Z]+: )?{why}", text), text
     assert "\n" not in text
     assert len(text) <= 1000
+    opened = xr.open_zarr("pin.zarr")
     assert bool((opened.wear_volume.isnull() == (opened.status == Status.FAILED)).all())
     monkeypatch.setattr(module, "MODEL", replace(module.MODEL, compute=per_case(solve)))
+    campaign = mdr_dask.read("pin.yaml")
     again = execute.run(campaign, "pin.zarr", Resources(threads=1), lambda _: None, retry_failed=True)
     assert (again.kept, again.done, again.failed) == (160, 40, 0)
 
@@ -218,10 +224,7 @@ def test_a_result_that_is_not_as_declared_is_a_failed_case(example, monkeypatch,
         return compute(block)
 
     monkeypatch.setattr(module, "MODEL", replace(module.MODEL, compute=at_once))
-    outcome = execute.run(mdr_dask.read("pin.yaml"), "pin.zarr", Resources(threads=1), lambda _: None)
-    assert (outcome.done, outcome.failed) == (160, 40)
-    (text,) = {each["message"] for each in messages("pin.zarr", "", xr.open_zarr("pin.zarr"))}
-    assert re.match(why, text), text
+    assert re.match(why, reason_of_failures())
 
 
 @pytest.mark.parametrize(

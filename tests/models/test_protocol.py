@@ -103,14 +103,8 @@ def written_line(tmp_path: Path, nodes: int) -> str:
     amplitude, phase = roughness.amplitudes(50, 0.7), roughness.phases(5, 0, 50)
     x = np.arange(nodes) / nodes * 0.002
     file = tmp_path / "line.csv"
-    np.savetxt(
-        file,
-        np.column_stack([x, 2e-6 * roughness.line(amplitude, phase, nodes)]),
-        delimiter=",",
-        header="x [m],z [m]",
-        comments="",
-        fmt="%.17g",
-    )
+    rows = np.column_stack([x, 2e-6 * roughness.line(amplitude, phase, nodes)])
+    np.savetxt(file, rows, "%.17g", ",", header="x [m],z [m]", comments="")
     return str(file)
 
 
@@ -128,9 +122,7 @@ def test_measured_line_is_the_generated_one(tmp_path: Path, protocol: dict[str, 
 
 def test_flat_measured_line_is_a_status(tmp_path: Path) -> None:
     file = tmp_path / "flat.csv"
-    np.savetxt(
-        file, np.column_stack([np.arange(20) * 1e-6, np.zeros(20)]), delimiter=",", header="x [m],z [m]", comments=""
-    )
+    file.write_text("x [um],z [um]\n" + "".join(f"{k},0\n" for k in range(20)))
     found = compute(block(surface={"profile": str(file)}, length=None, rms_roughness=None))
     assert np.all(found.status == Status.FAILED)
     assert all("got the flat profile" in message for message in found.messages.values())

@@ -29,14 +29,8 @@ def measured(path, oversampling=4):
     """Write the first realisation of the generated line to a file."""
     phase = roughness.phases(7, 0, 100)
     height = 5e-7 * roughness.line(roughness.amplitudes(100, 0.7), phase, 200 * oversampling)
-    np.savetxt(
-        path,
-        np.column_stack([np.arange(height.size) * 0.02 / height.size, height]),
-        "%.17g",
-        ",",
-        header="x,z\nm,m",
-        comments="",
-    )
+    rows = np.column_stack([np.arange(height.size) * 0.02 / height.size, height])
+    np.savetxt(path, rows, "%.17g", ",", header="x,z\nm,m", comments="")
     return {"surface": {"profile": str(path)}}
 
 
