@@ -27,6 +27,17 @@ SAFETY = 3.0
 """Roache's safety factor for an estimate from two grids."""
 
 
+class Estimate(NamedTuple):
+    """A computed value or array, and its estimated absolute error of the same shape."""
+
+    value: FloatArray
+    error: FloatArray
+
+    def scaled(self, factor: float) -> Estimate:
+        """Return the estimate in another unit."""
+        return Estimate(self.value * factor, self.error * factor)
+
+
 class Solution(NamedTuple):
     """Results of some cases on one grid.
 

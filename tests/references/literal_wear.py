@@ -47,7 +47,7 @@ def literal(
     for _ in range(number):
         for move in moves:
             image = image_0 + grid.forward @ worn
-            depth = grid.depth(image, force, depth) if constant_force else 1.0
+            depth = grid.depth(image, force) if constant_force else 1.0
             limit = np.maximum(depth - image, 0.0) / eta
             moved = np.clip(springs + move, -limit, limit)
             slip = grid.inverse @ (move - (moved - springs))

@@ -18,15 +18,9 @@ from mdr_dask.physics.lubrication.film_formulas import (
     square_of_half_width,
     thick_film,
 )
-from mdr_dask.physics.lubrication.line_contact import (
-    Estimate,
-    LineContact,
-    LineSolution,
-    Reading,
-    line_contact,
-    solve_film,
-)
+from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, Reading, line_contact, solve_film
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import Estimate
 
 #: Outputs that are positions, in half widths of the contact. The relative error of a position is the error divided by
 #: one half width, or by the position if the position is larger.

@@ -21,7 +21,7 @@ from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.refine import SAFETY, Solution, refine
+from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
 
 VISCOSITY_LAWS = ("barus", "roelands")
 
@@ -44,17 +44,6 @@ PACES = (Pace(0.12, 16), Pace(0.03, 250))
 PLACED = 0.1
 #: The stated error of a profile at a position is the largest error within this number of cells of the coarser grid.
 REACH = 2.0
-
-
-class Estimate(NamedTuple):
-    """A value (or a profile), and its estimated absolute error, which has the same shape."""
-
-    value: FloatArray
-    error: FloatArray
-
-    def scaled(self, factor: float) -> Estimate:
-        """Return the estimate in another unit."""
-        return Estimate(self.value * factor, self.error * factor)
 
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.

@@ -130,31 +130,13 @@ def _add_panel(
     outer[np.ix_(rows, members)] += 2.0 / np.pi * (last - first) * np.einsum("k,rkm->rm", weight, slope)
 
 
+@jit
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
     """Return the piecewise polynomial through `values` at the positions `places`; beyond the mesh the result is 0."""
-    result = np.zeros_like(places)
-    _interpolate(mesh, values, places, result)
-    return result
-
-
-def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return at each node z the sum of shares[k] p_k(stretch[k] z) over k, with the polynomials p_k through rows[k]."""
-    result = np.zeros(mesh.nodes.size)
-    _weighted(mesh, rows, shares, stretch, result)
-    return result
-
-
-@jit
-def _weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray, result: FloatArray) -> None:
-    for k in range(shares.size):
-        for node in range(mesh.nodes.size):
-            result[node] += shares[k] * value_at(mesh, rows[k], mesh.nodes[node] * stretch[k])
-
-
-@jit
-def _interpolate(mesh: Mesh, values: FloatArray, places: FloatArray, result: FloatArray) -> None:
+    result = np.empty_like(places)
     for number in range(places.size):
         result[number] = value_at(mesh, values, places[number])
+    return result
 
 
 @jit_inline

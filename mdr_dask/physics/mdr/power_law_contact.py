@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.mdr.transforms import power_factor, power_pressure
+from mdr_dask.physics.mdr.transforms import power_factor
 
 
 def contact_radius(depth: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike) -> FloatArray:
@@ -42,16 +42,6 @@ def radius_from_force(force: ArrayLike, amplitude: ArrayLike, exponent: ArrayLik
     n = np.asarray(exponent, dtype=float)
     factor = 2.0 * np.asarray(E_star) * power_factor(n) * np.asarray(amplitude) * n / (n + 1.0)
     return np.asarray((np.asarray(force, dtype=float) / factor) ** (1.0 / (n + 1.0)))
-
-
-def stress(r: ArrayLike, radius: float, amplitude: float, exponent: float, E_star: float) -> FloatArray:
-    """Return the pressure p(r) in a contact of radius a (thesis eq. 2.11); outside the contact the pressure is zero."""
-    return E_star * float(power_factor(exponent)) * amplitude * power_pressure(exponent, r, radius)
-
-
-def stiffness(radius: ArrayLike, E_star: ArrayLike) -> FloatArray:
-    """Return the normal stiffness dF_N/dd = 2 E* a; for the tangential stiffness pass G* instead of E*."""
-    return np.asarray(2.0 * np.asarray(E_star) * np.asarray(radius, dtype=float))
 
 
 def stick_radius(slip_share: ArrayLike, exponent: ArrayLike) -> FloatArray:

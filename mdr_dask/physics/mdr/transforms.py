@@ -8,25 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gamma, hyp2f1
+from scipy.special import gamma
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.refine import Estimate
 
 Function = Callable[[FloatArray], FloatArray]
 
-FIRST_NODES = 8
 MOST_NODES = 1024
-
-
-class Estimate(NamedTuple):
-    """A computed array and its estimated absolute error, of the same shape."""
-
-    value: FloatArray
-    error: FloatArray
 
 
 @lru_cache(maxsize=32)
@@ -200,19 +192,6 @@ def volume(image: Function, radius: float, *, breaks: Sequence[float] = (), tole
     return _integrate(integrand, edges, tolerance)
 
 
-def power_pressure(exponent: float, radius: ArrayLike, contact_radius: float) -> FloatArray:
-    """Return p / E* for the image |x|^n pressed to the contact radius a; zero outside the contact.
-
-    With w^2 = a^2 - r^2, this is (n/pi) a^(n-2) w 2F1(1, 1 - n/2; 3/2; w^2/a^2).
-    """
-    r = np.asarray(radius, dtype=float)
-    a = contact_radius
-    share = np.clip((a - r) * (a + r), 0.0, None) / a**2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        series = hyp2f1(1.0, 1.0 - 0.5 * exponent, 1.5, share)
-    return np.asarray(exponent / np.pi * a ** (exponent - 1.0) * np.sqrt(share) * series)
-
-
 def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
     """Return the angles t at which the integrals over x = r sin t are split, shape (m, pieces + 1)."""
     columns = [np.zeros_like(outer)]
@@ -225,7 +204,7 @@ def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
 
 def _integrate(integrand: Function, edges: FloatArray, tolerance: float) -> Estimate:
     """Return the integral over all pieces; the number of nodes is doubled until two successive results agree."""
-    nodes = FIRST_NODES
+    nodes = 8
     coarse = _gauss_sum(integrand, edges, nodes)
     while True:
         nodes *= 2

@@ -67,9 +67,9 @@ class UniformGrid:
         last = load[k - 1] * (self.edge(image, depth) - self.nodes[k - 1])
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
-    def depth(self, image: FloatArray, force: float, guess: float | None = None) -> float:
+    def depth(self, image: FloatArray, force: float) -> float:
         """Return the depth at which F_N / E* equals `force`, by Newton's method; the force is convex in the depth."""
-        depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)])) if guess is None else guess
+        depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)]))
         for _ in range(60):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)
             change = (force - self.force(image, depth)) / slope

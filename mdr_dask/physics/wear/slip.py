@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
-from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, interpolate_weighted, value_at
+from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Moment, settled
@@ -468,9 +468,15 @@ class GrossSlip:
     def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """Return a function of the unknowns: the weighted sum of past accumulated values at the nodes."""
         last = self.panels.nodes.size - 1
-        memories = np.array([moment.accumulated for moment in past])
-        widths = np.array([moment.unknowns[last] for moment in past])
-        return lambda unknowns: interpolate_weighted(self.panels.mesh, memories, shares, unknowns[last] / widths)
+
+        def known(unknowns: FloatArray) -> FloatArray:
+            result = np.zeros(self.panels.nodes.size)
+            for share, moment in zip(shares, past, strict=True):
+                stretch = unknowns[last] / moment.unknowns[last]
+                result += share * interpolate(self.panels.mesh, moment.accumulated, self.panels.nodes * stretch)
+            return result
+
+        return known
 
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from mdr_dask.physics.mdr import power_law_contact as contact
 
@@ -13,9 +12,6 @@ def test_hertz():
     d = contact.depth(a, A, 2.0)
     assert d == pytest.approx(a**2 / R, rel=1e-12)
     assert contact.normal_force(a, A, 2.0, E) == pytest.approx(4 / 3 * E * np.sqrt(R) * d**1.5, rel=1e-12)
-    r = np.array([0.0, 0.5e-4, 0.99e-4])
-    peak = 2 * E * a / (np.pi * R)
-    np.testing.assert_allclose(contact.stress(r, a, A, 2.0, E), peak * np.sqrt(1 - (r / a) ** 2), rtol=1e-12)
 
 
 def test_cone():
@@ -34,16 +30,7 @@ def test_identities_of_every_power(exponent):
     h = 1e-6
     radius = contact.contact_radius(np.array([0.3 - h, 0.3 + h]), 1.7, exponent)
     slope = np.diff(contact.normal_force(radius, 1.7, exponent, 5.0))[0] / (2 * h)
-    assert slope == pytest.approx(float(contact.stiffness(a, 5.0)), rel=1e-6)  # central difference
-    total = quad(
-        lambda t: (
-            2 * np.pi * a * np.sin(t) * contact.stress(a * np.sin(t), float(a), 1.7, exponent, 5.0) * a * np.cos(t)
-        ),
-        0,
-        np.pi / 2,
-        limit=200,
-    )[0]
-    assert total == pytest.approx(float(force), rel=1e-7)  # the integrable peak at the axis limits quad
+    assert slope == pytest.approx(2 * 5.0 * a, rel=1e-6)  # the stiffness 2 E* a, by a central difference
 
 
 def test_stick_radius_of_a_sphere():
