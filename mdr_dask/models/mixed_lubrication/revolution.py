@@ -91,7 +91,7 @@ def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> 
         "contact_length": length,
         "revolution_error": revolution.standard_error,
         "contact_conductance": length / specific,
-        "contact_resistance": float(breakthrough.contact_resistance(specific, length)),
+        "contact_resistance": specific / length if length > 0 else np.inf,
         "breakthrough_probability_error": of_probability,
         "contact_length_error": off,
         "contact_conductance_error": off / specific,

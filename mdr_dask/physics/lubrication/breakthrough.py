@@ -61,15 +61,6 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 
 @jit
-def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to one entry of the trace; `at` may lie outside the trace by less than its length."""
-    points = jumps.size - 1
-    at = at + points if at < 0 else at - points if at >= points else at
-    jumps[at] += number
-    jumps[at + 1] -= number
-
-
-@jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to the windows that contain only its head or only its tail.
 
@@ -91,10 +82,10 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
         force = first * overlap[k] + second * overlap[k + 1] + third * overlap[k + 2] + fourth * overlap[k + 3]
         breaks = until_node + force > limit * head * head * head if judged else always
         if breaks and 0 < head < end - start and head <= longest:
-            _add(jumps, node - width, _counted(head))
+            _block(jumps, node - width, 1, _counted(head))
         breaks = total - until_node > limit * tail * tail * tail if judged else always
         if breaks and node > start and tail <= longest:
-            _add(jumps, k, _counted(tail))
+            _block(jumps, k, 1, _counted(tail))
         until_node += whole_piece(overlap, k)
         node += 1
 
@@ -269,13 +260,3 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     steps = np.asarray(travel, dtype=np.float64)
     first, second = (np.round(steps * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
     return first, second
-
-
-def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
-    """Return the resistance ``R_c = rho/L_cont`` of parallel spots in ohm (thesis eq. 5.1); infinite without contact.
-
-    `resistivity` is in ohm m, and `contact_length` is the sum of the diameters of the spots in m.
-    """
-    length = np.asarray(contact_length, dtype=np.float64)
-    safe = np.where(length > 0, length, 1.0)
-    return np.where(length > 0, np.asarray(resistivity) / safe, np.inf)

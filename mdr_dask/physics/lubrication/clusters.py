@@ -66,9 +66,11 @@ def crossings(overlap: FloatArray, found: FloatArray) -> int:
 
 
 @jit
-def _totals(overlap: FloatArray, start: FloatArray, end: FloatArray, found: FloatArray) -> None:
+def _totals(overlap: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    found = np.empty(start.size)
     for c in range(start.size):
         found[c] = total(overlap, start[c], end[c])
+    return found
 
 
 def find_clusters(line: FloatArray, level: float, spacing: float, strength: float) -> Clusters:
@@ -87,6 +89,4 @@ def find_clusters(line: FloatArray, level: float, spacing: float, strength: floa
     elif inside:
         places = np.append(places[1:], places[0] + points)
     start, end = np.ascontiguousarray(places[::2]), np.ascontiguousarray(places[1::2])
-    totals = np.empty(start.size)
-    _totals(overlap, start, end, totals)
-    return Clusters(start, end, totals, overlap, strength * spacing**2, closed)
+    return Clusters(start, end, _totals(overlap, start, end), overlap, strength * spacing**2, closed)

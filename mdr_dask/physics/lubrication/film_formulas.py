@@ -132,16 +132,14 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material``, and the ranges of W, U and G of the fitted data."""
+    """A regression ``h/R = factor W^load U^speed G^material``, and the `ranges` of W, U and G of the fitted data."""
 
     name: str
     factor: float
     load: float
     speed: float
     material: float
-    load_range: tuple[float, float]
-    speed_range: tuple[float, float]
-    material_range: tuple[float, float]
+    ranges: tuple[tuple[float, float], ...]
 
     def __call__(self, W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
         """Return h/R; the arrays W, U and G broadcast."""
@@ -154,10 +152,9 @@ class FilmFormula:
 
     def outside(self, W: float, U: float, G: float) -> str:
         """Return a message that names which of W, U and G lie outside the fitted ranges, or an empty string."""
-        ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
-            for symbol, value, (low, high) in ranges
+            for symbol, value, (low, high) in zip("WUG", (W, U, G), self.ranges, strict=True)
             if not low <= value <= high
         ]
         return f"film formula {self.name} is extrapolated: {', '.join(outside)}" if outside else ""
@@ -165,14 +162,14 @@ class FilmFormula:
 
 # The ranges are quoted from memory, because no open copy of the papers was available
 # (docs/evidence/mixed-lubrication.md).
-_PAN_HAMROCK_RANGE = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
-_DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
+_PAN_HAMROCK_RANGES = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
+_DOWSON_HIGGINSON_RANGES = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
 
 #: Pan and Hamrock (1989). The factor of the central film is 2.922; the thesis prints 2.992 in eq. 5.3 and 2.929 in
 #: appendix B.
-PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, *_PAN_HAMROCK_RANGE)
-PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, *_PAN_HAMROCK_RANGE)
-DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, *_DOWSON_HIGGINSON_RANGE)
+PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, _PAN_HAMROCK_RANGES)
+PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, _PAN_HAMROCK_RANGES)
+DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, _DOWSON_HIGGINSON_RANGES)
 
 
 #: The formulas, by their names in a campaign.

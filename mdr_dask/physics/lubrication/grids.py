@@ -50,7 +50,7 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 
 
 def aligned(
-    positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
+    positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float
 ) -> tuple[FloatArray, float]:
     """Return about `count` nodes with a given density, and the distance between nodes times the density.
 

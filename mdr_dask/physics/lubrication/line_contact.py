@@ -18,12 +18,10 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
 from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
-from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
+from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
-
-VISCOSITY_LAWS = ("barus", "roelands")
 
 #: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
@@ -70,11 +68,6 @@ class LineContact(NamedTuple):
     def film_number(self) -> float:
         """Return ``K = (3 pi^2/4) U/W^2``."""
         return 3 * np.pi**2 / (8 * self.M**2)
-
-    @property
-    def log_viscosity(self) -> float:
-        """Return ``ln(eta/eta0)`` at Hertz' pressure."""
-        return float(log_viscosities(np.ones(1), self.liquid)[0])
 
     @property
     def liquid(self) -> Liquid:
@@ -130,8 +123,8 @@ def line_contact(
             raise ValueError(f"roelands' law needs a viscosity above 6.3e-5 Pa s, got {viscosity!r}")
         pole = ROELANDS_PRESSURE / p0
         exponent = G / (2 * E_star) * ROELANDS_PRESSURE / float(np.log(viscosity) + ROELANDS_LOGARITHM)
-    elif viscosity_law not in VISCOSITY_LAWS:
-        raise ValueError(f"expected the viscosity law {' or '.join(VISCOSITY_LAWS)}, got {viscosity_law!r}")
+    elif viscosity_law not in ("barus", "roelands"):
+        raise ValueError(f"expected the viscosity law barus or roelands, got {viscosity_law!r}")
     rise, saturation = (DENSITY_RISE * p0, DENSITY_SATURATION * p0) if compressible else (0.0, 0.0)
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
@@ -160,11 +153,6 @@ class LineSolution:
     def error(self) -> float:
         """The larger of the estimated relative errors of central and minimum film."""
         return float(max(film.error / film.value for film in (self.central_film, self.minimum_film)))
-
-    @property
-    def load_error(self) -> float:
-        """Relative deviation of the pressure's integral from the load."""
-        return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
     def estimate(self, reading: Reading) -> Estimate:
         """Return a quantity, such as a traction, with its error; `reading` evaluates the quantity on one grid."""
@@ -253,8 +241,8 @@ def _solve_on(
     return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, spacing)
 
 
-def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return a solution on a grid that is suitable for the expected film."""
+def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
+    """Return the solution whose density of nodes is used for all grids of `NODES`."""
     for factor, starved, count, pace in ATTEMPTS:
         guess = factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
@@ -263,6 +251,10 @@ def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
         outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, pace)
         if outcome == Outcome.CONVERGED:
             break
+    for _ in range(2 if outcome == Outcome.CONVERGED else 0):
+        adapted_outcome, adapted = _refined(case, [state], state, ADAPTED_NODES)
+        if adapted_outcome == Outcome.CONVERGED:
+            state = adapted
     return outcome, state
 
 
@@ -282,16 +274,6 @@ def _refined(
         straight = np.interp(nodes, last.nodes, last.pressure)
         outcome, found = _solve_on(case, nodes, straight, last.central, PACES[1], spacing)
     return outcome, found
-
-
-def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return the solution whose density of nodes is used for all grids of `NODES`."""
-    outcome, state = _first_solution(case)
-    for _ in range(2 if outcome == Outcome.CONVERGED else 0):
-        adapted_outcome, adapted = _refined(case, [state], state, ADAPTED_NODES)
-        if adapted_outcome == Outcome.CONVERGED:
-            state = adapted
-    return outcome, state
 
 
 def solve_film(

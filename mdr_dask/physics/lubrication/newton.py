@@ -28,6 +28,9 @@ _FILM_SHARE = 0.8
 _LEAST_SHARE = 1e-9
 #: The factorised Jacobian is reused if the last step was smaller than this fraction of the step before.
 _SHRINKS = 0.1
+#: The iteration ends after a step whose relative size is below this value. The remaining error is about the square of
+#: the size, or more if the Jacobian was reused; the size must then be a hundred times smaller.
+_TOLERANCE = 1e-4
 
 
 class Grid(NamedTuple):
@@ -50,13 +53,11 @@ class Pace(NamedTuple):
     """Limits of an iteration.
 
     `clip` is the largest change of a pressure in one step divided by the largest pressure, and `most` the largest
-    number of steps. The iteration ends after a step whose relative size is below `tolerance`, or below a hundredth of
-    it if the Jacobian was reused. With a new Jacobian, the remaining error is about the square of the size.
+    number of steps.
     """
 
     clip: float
     most: int
-    tolerance: float = 1e-4
 
 
 class Iterate(NamedTuple):
@@ -281,11 +282,11 @@ def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> Non
 
 
 @jit
-def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
-    """Write the film at the nodes to H, given the nodal pressures and the film at ``X = 0``."""
-    for i in range(P.size):
-        H[i] = central + 0.5 * grid.nodes[i] ** 2
+def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
+    """Return the film at the nodes, given the nodal pressures and the film at ``X = 0``."""
+    H = central + 0.5 * grid.nodes**2
     _add_deformation(grid.influence, P, H)
+    return H
 
 
 @jit
@@ -320,15 +321,8 @@ def _take_step(
     for i in range(P.size):
         P[i] = max(0.0, P[i] + share * step[i])
     central += share * change
-    _fill_film(grid, P, central, H)
+    H[:] = film_on(grid, P, central)
     return central, size if central > 0.0 and np.min(H) > 0.0 else np.nan
-
-
-def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
-    """Return the film at the nodes, given the nodal pressures and the film at ``X = 0``."""
-    H = np.empty_like(P)
-    _fill_film(grid, P, central, H)
-    return H
 
 
 def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
@@ -342,7 +336,7 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
     solved, factors, b = listed[:0], None, np.empty(0)
-    size, before, last = np.inf, 1.0, pace.tolerance
+    size, before, last = np.inf, 1.0, _TOLERANCE
     for steps in range(pace.most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
@@ -354,12 +348,12 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
             break
         if same and size < _SHRINKS * before:
             _fill_imbalance(grid, P, found.value, active, b)
-            last = 0.01 * pace.tolerance
+            last = 0.01 * _TOLERANCE
         else:
             solved, b = active.copy(), np.empty(active.size + 1)
             A = workspace[: b.size**2].reshape(b.size, b.size)
             _fill_equations(grid, P, found, active, A, b)
-            factors, last = factorise(A), pace.tolerance
+            factors, last = factorise(A), _TOLERANCE
         if factors is None:
             return Iterate(Outcome.SINGULAR, P, central, H)
         solution = factors.solve(b)

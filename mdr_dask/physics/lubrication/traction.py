@@ -13,9 +13,6 @@ from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.line_contact import LineContact
 from mdr_dask.physics.lubrication.newton import log_viscosities
 
-#: Largest natural logarithm of the viscosity ratio that is evaluated, against overflow.
-_LARGEST_EXPONENT = 600.0
-
 
 def shear_stress(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
@@ -26,7 +23,7 @@ def shear_stress(
     in p0 makes it ``tau_E asinh(tau/tau_E)``. The load parameter W is needed because of ``a/R = sqrt(8 W/pi)``.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
-    exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), _LARGEST_EXPONENT)
+    exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), 600.0)  # against overflow
     newtonian = np.where(grid.pressure > 0, slope * np.exp(exponent) / grid.film, 0.0)
     return newtonian if eyring_stress is None else eyring_stress * np.arcsinh(newtonian / eyring_stress)
 
