@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import gammaincinv
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign.measured import Measured, read_measured, unknowns
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import identifiability
@@ -26,6 +26,7 @@ from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, likelihood, posterior
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
+from mdr_dask.units import shown
 
 #: Smallest possible error of measurement, as a fraction of the rms residual of the best prediction.
 LEAST = 0.2
@@ -60,9 +61,9 @@ class Calibration:
         return self.prediction.values(self.posterior.places)
 
     @cached_property
-    def ends(self) -> list[identifiability.Ends]:
+    def ends(self) -> BoolArray:
         """For each unknown, whether the lower and the upper end of its axis are open (see `identifiability.OPEN`)."""
-        return identifiability.open_ends(self.posterior)
+        return identifiability.at_ends(self.posterior) > -identifiability.OPEN
 
     @cached_property
     def free(self) -> list[int]:
@@ -232,7 +233,10 @@ def read_file(path: str | Path) -> dict[str, str]:
 def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Calibrate a series. Return the values, intervals and correlations of the unknowns."""
     (dataset,) = groups.values()
-    return summary(calibrate(dataset, measured_of(dataset)))
+    measured = measured_of(dataset)
+    meaning = dataset[measured.output].attrs.get("long_name", measured.output)
+    compared = f"{measured.values.size} points, compared with {measured.output}: {meaning}"
+    return summary(calibrate(dataset, measured)).assign(measured=((), compared, {"units": "1"}))
 
 
 def summary(found: Calibration) -> xr.Dataset:
@@ -307,7 +311,7 @@ def sentence(found: Calibration) -> str:
     )
     free = [found.unknowns[k] for k in found.free]
     if not free:
-        return f"{start}every unknown is determined"
+        return f"{start}every unknown is determined{_cut(found)}"
     known = [name for name in found.unknowns if name not in free]
     for product in found.products:
         name, unit = found.name_and_unit(product)
@@ -315,13 +319,25 @@ def sentence(found: Calibration) -> str:
         half = (ends["_high"] - ends["_low"]) / 2 / ends[""]
         known.append(f"{name} ({ends['']:.3g}{'' if unit == '1' else ' ' + unit} +- {100 * half:.2g} %)")
     only = f"only {' and '.join(known)} {'is' if len(known) == 1 else 'are'} determined; " if known else ""
-    for k in found.free:
-        bound = _bound(found, k)
-        if bound:
-            side, end = ("below", bound["_low"]) if found.ends[k].high else ("above", bound["_high"])
-            return f"{start}{only}{free[0]} is only bounded from {side}, at {end:.4g}"
+    bound = _bound(found, found.free[0])
+    if bound:
+        side, end = ("below", bound["_low"]) if found.ends[found.free[0], 1] else ("above", bound["_high"])
+        at = shown(end, found.units[free[0]])
+        return f"{start}{only}{free[0]} is only bounded from {side}, at {at}{_cut(found)}"
     no_number = f"no number is given for {' and '.join(free)}"
-    return f"{start}{only or 'nothing is determined within the ranges of the study; '}{no_number}"
+    return f"{start}{only or 'nothing is determined within the ranges of the study; '}{no_number}{_cut(found)}"
+
+
+def _cut(found: Calibration) -> str:
+    """Return a text on the intervals of determined unknowns that an axis cuts off (see `identifiability.CUT`)."""
+    is_high = identifiability.at_ends(found.posterior) > -identifiability.CUT
+    cut = [
+        f"{name} at {shown(float(axis[end]), found.units[name])}"
+        for k, (name, axis) in enumerate(found.prediction.unknowns.items())
+        for end in (0, -1)
+        if k not in found.free and is_high[k, end]
+    ]
+    return f"; the axis cuts off the interval of {' and '.join(cut)}: widen the axis" if cut else ""
 
 
 FITS: tuple[Fit, ...] = (

@@ -8,12 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.fits.posterior import Posterior
 
 #: An end of the axis of an unknown is *open* if the logarithm of the posterior density there is less than `OPEN` below
 #: its maximum: for a normal density, within two standard errors.
 OPEN = 2.0
+#: The axis cuts off the 95 % interval of an unknown if the density at its end exceeds 5 % of the maximum.
+CUT = float(np.log(20))
 #: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
 #: The data determine a product if the spread of its logarithm is less than this fraction of the spread without data.
@@ -28,30 +30,20 @@ ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
 
-class Ends(NamedTuple):
-    """Whether the lower and the upper end of the axis of an unknown are open (see `OPEN`)."""
-
-    low: bool
-    high: bool
-
-
-def open_ends(found: Posterior) -> list[Ends]:
-    """Return for each unknown whether the lower and the upper end of its axis are open (see `OPEN`)."""
-    highest = found.density.max()
-    ends = []
-    for place in found.places.T:
-        borders = (place < found.width, place > 1 - found.width)
-        ends.append(Ends(*(bool(np.any(found.density[at] > highest - OPEN)) for at in borders)))
-    return ends
+def at_ends(found: Posterior) -> FloatArray:
+    """Return ln(density) minus its maximum at both ends of the axis of each unknown, shape (unknowns, 2)."""
+    borders = np.stack([found.places < found.width, found.places > 1 - found.width], axis=-1)
+    density = np.where(borders, found.density[:, None, None], -np.inf)
+    return np.asarray(density.max(axis=0) - found.density.max())
 
 
-def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
+def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
     """Return the indices of unknowns that have an open end or depend strongly on such unknowns (see `LINKED`)."""
-    free = [k for k, end in enumerate(ends) if any(end)]
+    free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:
         return []
     centred = found.places - found.weights @ found.places
-    others = [k for k in range(len(ends)) if k not in free]
+    others = [k for k in range(len(is_open)) if k not in free]
     return sorted([*free, *(k for k in others if _explained(centred, found.weights, k, free) > LINKED)])
 
 

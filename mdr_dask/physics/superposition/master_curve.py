@@ -286,10 +286,9 @@ def rereference(
     """Return the same master curve for a new reference, which is a group or a value between two groups.
 
     The horizontal factor at the new reference is the factor of the law plus a departure. This departure is interpolated
-    linearly between the departures of the measured factors from the law at the two neighbouring groups. The error of
-    this interpolation is `dT^2 |h''| / 8` for two groups at a distance dT, where h'' is the second derivative of the
-    departures. To include this error, a normally distributed number, with this error as standard deviation, is added to
-    each draw.
+    linearly between the departures of the measured factors from the law at the two neighbouring groups. To include the
+    error of this interpolation (see `interpolation_error`), a normally distributed number, with this error as standard
+    deviation, is added to each draw.
 
     Parameters
     ----------
@@ -346,14 +345,12 @@ def rereference(
 
 
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
-    """Return the error ``d^2 |h''| / 8`` of the linear interpolation between two neighbours at the distance d.
+    """Return the error ``(x - a) (b - x) |h''| / 2`` of the linear interpolation at x between the neighbours a and b.
 
-    The larger of the second derivatives h'' at both neighbours is used. At a neighbour the error is zero.
+    The larger of the second derivatives h'' of the factors at both neighbours is used.
     """
-    if place in places:
-        return 0.0
-    after = int(np.searchsorted(places, place))
+    after = int(np.clip(np.searchsorted(places, place), 1, places.size - 1))
     slopes = np.diff(factors) / np.diff(places)
     bends = np.diff(slopes) / ((places[2:] - places[:-2]) / 2)
-    near = bends[max(after - 2, 0) : after]
-    return float((places[after] - places[after - 1]) ** 2 * np.max(np.abs(near), initial=0.0) / 8)
+    bend = np.max(np.abs(bends[max(after - 2, 0) : after]), initial=0.0)
+    return float((place - places[after - 1]) * (places[after] - place) * bend / 2)

@@ -68,7 +68,8 @@ def test_a_reference_between_groups_contains_the_error_of_the_interpolation():
         )
     )
     plain = rereference(free, 2.5)
-    assert interpolation_error(groups, free.horizontal, 2.5) == pytest.approx(1 / 8)
+    errors = [interpolation_error(groups, free.horizontal, place) for place in (2.0, 2.1, 2.5, 2.9, 3.0)]
+    assert errors == pytest.approx([0, 0.09 / 2, 1 / 8, 0.09 / 2, 0])
     assert plain.horizontal_error[0] == pytest.approx(1 / 8, rel=0.01)
     assert plain.horizontal[2] == pytest.approx(2 - (2 + 4.5) / 2)
     by_law = rereference(free, 2.5, law=0.5 * groups**2, at_reference=0.5 * 2.5**2)
