@@ -19,7 +19,7 @@ from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources
 from mdr_dask.store import locks
 from mdr_dask.store.files import with_digest
-from mdr_dask.store.layout import read_record
+from mdr_dask.store.integrity import read_record
 from mdr_dask.store.records import name_of
 
 

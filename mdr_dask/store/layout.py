@@ -27,24 +27,19 @@ from mdr_dask.plan import Template
 from mdr_dask.store.files import (
     CLAIMS,
     LAYOUT,
-    RECORD_FOLDER,
     digest,
     group_name,
     listed,
-    parsed,
     read_bytes,
     read_many,
     remove,
-    with_digest,
     write_bytes,
     write_stages,
 )
+from mdr_dask.store.integrity import RECORD, LayoutRecord, read_record
 from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
-#: File with the record of the layout, which contains the digests of all other files of the layout. For Zarr it is an
-#: empty group with attributes; Zarr would warn about any other file. No series can have this name.
-RECORD = f"{RECORD_FOLDER}/zarr.json"
 #: Number of values in a chunk of a coordinate: a single chunk for nearly every axis.
 _COORDINATE_CHUNK = 4096
 #: Names of the attributes that `_series_attributes` returns. If series are added to a store without series, these
@@ -153,41 +148,6 @@ class Finding:
     kind: str
     name: str
     what: str
-
-
-@dataclass(frozen=True)
-class LayoutRecord:
-    """The record of the layout of a study."""
-
-    # For each file of the layout, the digests of all its versions, the newest last. The record is written before these
-    # files, and a run may be killed in between. So a stored file may have any of the versions.
-    files: Mapping[str, list[str]]
-    # The content of the newest ``zarr.json``, with which `mdr_dask.store.repair` restores this file.
-    root: str
-
-    @property
-    def content(self) -> bytes:
-        """The content of the file `RECORD`."""
-        record = json.loads(with_digest({"files": self.files, "root": self.root}))
-        return json.dumps({"zarr_format": 3, "node_type": "group", "attributes": record}).encode()
-
-
-def read_record(url: str) -> LayoutRecord | None:
-    """Return the record of the layout, or None if it is missing or damaged."""
-    content = read_bytes(url, RECORD)
-    try:
-        held = parsed(content or b"{}")["attributes"]
-        record = LayoutRecord(dict(held["files"]), str(held["root"]))
-        is_valid = record.content == content and _is_valid(record.files)
-    except (TypeError, KeyError, ValueError):
-        return None
-    return record if is_valid else None
-
-
-def _is_valid(files: Mapping[Any, Any]) -> bool:
-    """Return whether all names are inside the store, because the record may come from an unknown source."""
-    inside = all(not name.startswith("/") and ".." not in name.split("/") for name in files)
-    return inside and "zarr.json" in files and all(isinstance(versions, list) for versions in files.values())
 
 
 def layout_faults(url: str) -> Iterator[Finding]:

@@ -17,7 +17,8 @@ from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_many
-from mdr_dask.store.layout import RECORD, layout_faults
+from mdr_dask.store.integrity import RECORD
+from mdr_dask.store.layout import layout_faults
 from mdr_dask.store.study import array_of, document
 
 #: Largest number of faults that a message names; `verify` names all of them.

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.files import bytes_of, group_name
+from mdr_dask.store.files import bytes_of, group_name, read_json
+from mdr_dask.store.integrity import is_safe
 from mdr_dask.store.ledgers import require_undamaged
-from mdr_dask.store.study import require_valid_file, series_names
+from mdr_dask.store.study import series_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +59,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
 def _open_sorted(url: str, series: str) -> xr.Dataset:
     import xarray as xr
 
-    require_valid_file(url, series)
+    if not is_safe(read_json(url, group_name(series, "zarr.json")) or {}):
+        raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is missing or damaged")
     opened = partial(xr.open_zarr, bytes_of(url), group=group_name(series) or None, consolidated=True, zarr_format=3)
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:

@@ -14,8 +14,8 @@ from mdr_dask.errors import StoreError
 from mdr_dask.store.files import (
     KEPT,
     LAYOUT,
-    RECORD_FOLDER,
     ROOT,
+    digest,
     group_name,
     guarded,
     local,
@@ -23,69 +23,50 @@ from mdr_dask.store.files import (
     read_bytes,
     require_bucket,
 )
-from mdr_dask.store.schema import faults
+from mdr_dask.store.integrity import RECORD, is_safe, read_record
 
 _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it first"}
 
 
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
-    """Return the checked metadata of a group, or None if the group does not exist.
+    """Return the metadata of a group from ``zarr.json``, or None if the group does not exist.
 
     The result is cached, so do not change it. Raise StoreError if this program did not write the metadata.
     """
     content = read_bytes(url, "zarr.json")
     if content is None:
         return None
-    group = group_name(series)
     with guarded(url, "reading zarr.json"):
-        found, fault = _checked(content, group)
-    if fault is not None:
-        raise StoreError(f"{url}: zarr.json{fault}; 'mdr-dask verify {url}' names what is damaged")
-    return found
-
-
-def require_valid_file(url: str, series: str) -> None:
-    """Raise StoreError if this program did not write the metadata file of a series."""
-    name = group_name(series, "zarr.json")
-    content = read_bytes(url, name)
-    with guarded(url, f"reading {name}"):
-        _, fault = _checked(content, "") if content is not None else (None, " is missing")
-    if fault is not None:
-        raise StoreError(f"{url}: {name}{fault}; 'mdr-dask verify {url}' names what is damaged")
-
-
-def group_document_of(root: bytes, series: str) -> Mapping[str, Any] | None:
-    """Return the metadata of a group from the content of ``zarr.json``, or None if there is no such group."""
-    return _checked(root, group_name(series))[0]
+        root = _checked(url, content)
+    if root is None:
+        raise StoreError(f"{url}: zarr.json is damaged; 'mdr-dask verify {url}' names all faults")
+    return group_of(root, group_name(series))
 
 
 @lru_cache(maxsize=32)
-def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the metadata of a study or of one of its groups, and the first fault in them (None without a fault)."""
-    found = parsed(content)
-    if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
-        return found, " is damaged"
-    attributes = found.get("attributes", {})
-    layout = attributes.get("mdr_dask_layout")
-    # a later layout is not checked, because `attributes` refuses it with its own message
-    is_newer = isinstance(layout, int) and layout > LAYOUT
-    if "mdr_dask_layout" not in attributes or only_claimed(attributes) or is_newer:
-        return None if group else found, None
-    fault = next(faults(found), None)
-    if fault is None and group:
-        return _group(found, group)
-    return found, fault and f": {fault}"
+def _checked(url: str, content: bytes) -> dict[str, Any] | None:
+    """Return the metadata of a study, or None if they have no digest in the record of the layout or are not safe."""
+    root = parsed(content)
+    attributes = root.get("attributes", {}) if isinstance(root, dict) else None
+    if not isinstance(attributes, dict):
+        return None
+    layout = attributes.get("mdr_dask_layout", LAYOUT + 1)
+    if only_claimed(attributes) or (isinstance(layout, int) and layout > LAYOUT):
+        return root  # no study or one of a later version, which `attributes` refuses
+    record = read_record(url)
+    is_known = record is None or digest(content) in record.files["zarr.json"]
+    return root if is_known and is_safe(root) else None
 
 
-def _group(root: Mapping[str, Any], group: str) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the metadata of a group from those of its study, and the first fault in them (None without a fault)."""
-    members = root["consolidated_metadata"]["metadata"]
+def group_of(root: Mapping[str, Any], group: str) -> Mapping[str, Any] | None:
+    """Return the metadata of a group from those of its study, or None if there is no such group."""
+    if not group:
+        return root
+    members = root.get("consolidated_metadata", {}).get("metadata", {})
     if members.get(group, {}).get("node_type") != "group":
-        return None, None
+        return None
     own = {"metadata": members_of(members, group)}
-    found = {**root, "attributes": members[group]["attributes"], "consolidated_metadata": own}
-    fault = next(faults(found), None)
-    return found, fault and f": {group}: {fault}"
+    return {**root, "attributes": members[group]["attributes"], "consolidated_metadata": own}
 
 
 def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
@@ -126,7 +107,7 @@ def is_study(url: str) -> bool:
 def _root_attributes(url: str) -> dict[str, Any] | None:
     """Return the attributes of the Zarr group at a path or URL, or None if there is no group."""
     found = document(url)
-    if found is None and read_bytes(url, f"{RECORD_FOLDER}/zarr.json") is not None:
+    if found is None and read_bytes(url, RECORD) is not None:
         raise StoreError(f"{url}: zarr.json is missing; 'mdr-dask verify --repair {url}' writes it again")
     return None if found is None else dict(found.get("attributes", {}))
 

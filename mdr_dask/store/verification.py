@@ -22,19 +22,12 @@ from mdr_dask.store.files import (
     write_bytes,
     write_stages,
 )
-from mdr_dask.store.layout import (
-    RECORD,
-    Finding,
-    coordinate_files,
-    group_names,
-    layout_faults,
-    metadata_files,
-    read_record,
-)
+from mdr_dask.store.integrity import RECORD, read_record
+from mdr_dask.store.layout import Finding, coordinate_files, group_names, layout_faults, metadata_files
 from mdr_dask.store.ledgers import Blocks
 from mdr_dask.store.locks import active_runs, exclusive
 from mdr_dask.store.records import decoded, folder, lines, name_of
-from mdr_dask.store.study import attributes, document, group_document_of, refuse_file
+from mdr_dask.store.study import attributes, document, group_of, refuse_file
 
 #: Ending of temporary files, which do not belong to the study.
 IGNORED = ".partial"
@@ -145,7 +138,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
     root = json.loads(content)
     members = root["consolidated_metadata"]["metadata"]
     for name in ["", *group_names(members)]:
-        group = group_document_of(content, name)
+        group = group_of(root, name)
         if group is not None and "status" in group["consolidated_metadata"]["metadata"]:
             found.groups.append(Group(Blocks.of(name, group)))
     if record is None:
