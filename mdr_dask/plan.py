@@ -379,21 +379,23 @@ def _bytes_per_result(template: Template) -> int:
 
 def estimate(campaign: Campaign) -> Estimate:
     """Return the costs of a campaign without running it; raise CampaignError if it is too large to be run."""
-    model = models.load(campaign.model)
-    realisations = campaign.replication.at_least
-    parts = [_estimate_series(template, model) for template in templates(campaign, realisations)]
+    model, replication = models.load(campaign.model), campaign.replication
+    layout = templates(campaign, replication.at_least)
+    cases = sum(template.cases for template in layout)
+    counts = [_operations_and_solves(template, model) for template in layout]
+    notes = (note for template in layout for note in template.notes)
     return Estimate(
-        cases=sum(part.cases for part in parts),
-        realisations=realisations,
-        at_most=campaign.replication.at_most,
-        results=sum(part.results for part in parts),
-        solves=sum(part.solves for part in parts),
-        blocks=sum(part.blocks for part in parts),
-        bytes=sum(part.bytes for part in parts),
-        operations=None if model.operations is None else sum(part.operations or 0.0 for part in parts),
-        files=1 + sum(part.files for part in parts) + any(series.name for series in campaign.series),
-        notes=tuple(dict.fromkeys((*(note for part in parts for note in part.notes), *measured.notes(campaign)))),
-        growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),
+        cases=cases,
+        realisations=replication.at_least,
+        at_most=replication.at_most,
+        results=cases * replication.at_least,
+        solves=sum(solves for _, solves in counts),
+        blocks=sum(math.prod(template.grid) for template in layout),
+        bytes=sum(template.bytes for template in layout),
+        operations=None if model.operations is None else sum(operations for operations, _ in counts),
+        files=1 + sum(template.files for template in layout) + any(series.name for series in campaign.series),
+        notes=tuple(dict.fromkeys((*notes, *measured.notes(campaign)))),
+        growth=sum(template.cases * _growth(template.series) for template in layout) / cases,
     )
 
 
@@ -404,30 +406,18 @@ def _growth(series: Series) -> float:
     )
 
 
-def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
-    """Estimate the costs of a series from its blocks of the first realisations, or from `SAMPLED` of them."""
-    blocks, lengths = math.prod(template.grid[:-1]), template.grid[:-1]
+def _operations_and_solves(template: Template, model: Model[Any]) -> tuple[float, int]:
+    """Estimate the operations and solutions of a series from at most `SAMPLED` blocks of the first realisations."""
+    lengths, realisations = template.grid[:-1], template.sizes["realisation"]
+    blocks = math.prod(lengths)
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
-    operations, solves = 0.0, 0.0
+    operations, distinct = 0.0, 0.0
     for index in zip(*np.unravel_index(sample, lengths), strict=True) if lengths else [()]:
         place = (*map(int, index), 0)
         operations += template.operations(place) * blocks / sample.size
         if model.distinct is not None:
             block = template.block(place)
             alone = replace(block, realisations=block.realisations[:1])
-            solves += model.distinct(alone) * blocks / sample.size
-    realisations = template.sizes["realisation"]
-    distinct = template.cases if model.distinct is None else round(solves)
-    return Estimate(
-        cases=template.cases,
-        realisations=realisations,
-        at_most=template.campaign.replication.at_most,
-        results=template.cases * realisations,
-        solves=distinct * realisations,
-        blocks=math.prod(template.grid),
-        bytes=template.bytes,
-        files=template.files,
-        operations=operations * realisations / min(template.chunks["realisation"], realisations),
-        notes=template.notes,
-        growth=_growth(template.series),
-    )
+            distinct += model.distinct(alone) * blocks / sample.size
+    solves = template.cases if model.distinct is None else round(distinct)
+    return operations * realisations / min(template.chunks["realisation"], realisations), solves * realisations

@@ -97,7 +97,7 @@ def test_a_part_that_needs_results_of_missing_parts_ends_with_a_message(toy, url
 
 BUSY = {
     "alone": (lambda url: store.exclusive(url), r"process \d+ on .* is running on this store; wait for it, or stop it"),
-    "2/3": (lambda url: store.shared(url, Part(2, 3)), "part 2/3 is running on this store; wait for them"),
+    "2/3": (lambda url: store.shared(url, Part(2, 3)), "part 2/3 is running on this store; wait for it, or stop it"),
     "3/4": (lambda url: store.shared(url, Part(3, 4)), "part 3/4 is running on this store"),
 }
 

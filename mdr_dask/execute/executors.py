@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import threading
 from collections.abc import Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack
@@ -41,10 +40,8 @@ class Executor(AbstractContextManager["Executor"]):
         self._threads = resources.workers or resources.threads or _cores()
         is_python = resources.threads is None and getattr(models.load(model).compute, "is_plain_python", False)
         is_apart = is_python or resources.workers is not None or resources.case_timeout is not None
-        self._compute = self._in_child if is_apart and hasattr(os, "fork") else self._here
-        self._children: SimpleQueue[Child] = SimpleQueue()
-        self._has_children = False
-        self._starting = threading.Lock()
+        self._is_apart = is_apart and hasattr(os, "fork")
+        self._children: SimpleQueue[Child] | None = None
         self._stack = ExitStack()
         self._window: TaskWindow | None = None
 
@@ -53,8 +50,8 @@ class Executor(AbstractContextManager["Executor"]):
 
     def apart(self) -> None:
         """Compute all blocks in child processes, because a case may have crashed the last run."""
-        if hasattr(os, "fork") and not self._resources.remote and self._compute == self._here:
-            self._compute = self._in_child
+        if hasattr(os, "fork") and not self._resources.remote and not self._is_apart:
+            self._is_apart = True
             sentence = "the last run was killed or crashed: blocks are computed in child processes, to find the cause"
             self._tell(Event("after a crash", {}, sentence))
 
@@ -71,6 +68,12 @@ class Executor(AbstractContextManager["Executor"]):
         if self._window is not None:
             self._window.run(works, settle)
         else:
+            if self._is_apart and self._children is None:
+                from mdr_dask.execute.children import children
+
+                self._children = SimpleQueue()
+                for child in self._stack.enter_context(children(self._threads, self._model)):
+                    self._children.put(child)
             with one_blas_thread():
                 self._in_pool(works, settle)
 
@@ -101,32 +104,19 @@ class Executor(AbstractContextManager["Executor"]):
             raise
         pool.shutdown()
 
-    def _here(self, work: Work) -> list[tuple[Work, Outcome]]:
+    def _compute(self, work: Work) -> list[tuple[Work, Outcome]]:
         self._tell(of_block("begun", work))
-        return [(work, run_block(work))]
-
-    def _in_child(self, work: Work) -> list[tuple[Work, Outcome]]:
+        if self._children is None:
+            return [(work, run_block(work))]
         from mdr_dask.execute.children import compute_apart
 
-        self._tell(of_block("begun", work))
-        child = self._free_child()
+        child = self._children.get()
         try:
             return list(compute_apart(child, work, self._resources.case_timeout))
         except (AttributeError, ImportError, ModelError):  # the child cannot import a model that a script has defined
             return [(work, run_block(work))]
         finally:
             self._children.put(child)
-
-    def _free_child(self) -> Child:
-        """Return an idle child process. All child processes are started when the first of them is needed."""
-        from mdr_dask.execute.children import children
-
-        with self._starting:
-            if not self._has_children:
-                for child in self._stack.enter_context(children(self._threads, self._model)):
-                    self._children.put(child)
-                self._has_children = True
-        return self._children.get()
 
 
 def _cores() -> int:

@@ -115,7 +115,7 @@ def exclusive(url: str) -> Iterator[Lock]:
         with gate(url):
             parts = _parts(url)
             if parts:
-                raise StoreBusyError(f"{url}: {_named(parts)} running on this store; wait for them, or stop them")
+                raise _busy(url, f"part {', '.join(map(str, parts))}")
             lock = held.enter_context(acquire(url))
             if lock.owner:
                 for name in _part_locks(url) if local(url) is not None else ():
@@ -137,7 +137,7 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
             others = _parts(url)
             unfit = [other for other in others if other == part or other.count != part.count]
             if unfit:
-                raise StoreBusyError(f"{url}: {_named(unfit)} running on this store; wait for them, or stop them")
+                raise _busy(url, f"part {', '.join(map(str, unfit))}")
             lock = held.enter_context(acquire(url, part.lock))
             if lock.owner and not others:
                 sweep(url)
@@ -316,12 +316,6 @@ def _part_locks(url: str) -> list[str]:
         files = (found.name for found in file.parent.glob(f"{escape(before)}*.lock"))
         names |= {found.removeprefix(before).removesuffix(".lock") for found in files}
     return [name for name in sorted(names) if re.fullmatch(rf"{_PART}\d+-of-\d+", name)]
-
-
-def _named(parts: list[Part]) -> str:
-    """Return ``part 1/8 is`` or ``parts 1/8, 2/8 are``, the beginning of a message."""
-    names = ", ".join(map(str, parts))
-    return f"part {names} is" if len(parts) == 1 else f"parts {names} are"
 
 
 def _busy(url: str, who: str) -> StoreBusyError:

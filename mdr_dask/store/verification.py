@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from operator import itemgetter
 
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.plan import BlockIndex
@@ -35,16 +34,16 @@ IGNORED = ".partial"
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
 
-#: All attempts at a block in their order. For each attempt: the digests of the chunks that it has written, by the name
-#: of the array.
-History = list[Mapping[str, str]]
-
 
 @dataclass
 class Group:
     """A group of a store during verification: its blocks, and the faults that `repair` removes."""
 
     blocks: Blocks
+    # For each block and attempt, the digests of the chunks that were written, by the name of the array.
+    attempts: dict[BlockIndex, dict[int, Mapping[str, str]]] = field(default_factory=dict)
+    # Blocks that must be in the ledger.
+    finished: set[BlockIndex] = field(default_factory=set)
     bad_blocks: set[BlockIndex] = field(default_factory=set)
     bad_records: set[str] = field(default_factory=set)
     foreign: list[str] = field(default_factory=list)
@@ -151,18 +150,22 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
 
 
 def _check_records(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Find records that are damaged or foreign; return the names of all record files."""
+    """Find records that are damaged or foreign, and keep the others; return the names of all record files."""
     series, known = group.blocks.series, set[str]()
     for name, line in lines(url, series):
         known.add(name)
-        record = decoded(line)
+        record, is_merged = decoded(line), name.endswith(".jsonl")
         if record is None:
             finding = Finding("damaged", name, "a record is not what was written")
-        elif name.endswith(".json") and name != name_of(series, tuple(record["block"]), record["attempt"]):
+        elif not is_merged and name != name_of(series, tuple(record["block"]), record["attempt"]):
             finding = Finding("damaged", name, f"the record of block {record['block']}")
         elif not group.blocks.has(tuple(record["block"])):
             finding = Finding("foreign", name, f"the record of block {record['block']}, which does not exist")
         else:
+            block = tuple(record["block"])
+            group.attempts.setdefault(block, {})[record["attempt"]] = record.get("chunks", {})
+            if is_merged:  # a record is merged only when its block is in the ledger
+                group.finished.add(block)
             continue
         found.findings.append(finding)
         group.bad_records.add(name)
@@ -176,21 +179,20 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
 def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
     """Compare the chunks of every block with the digests in its records; return the names of all chunks."""
     blocks, known = group.blocks, set[str]()
-    histories, merged = _histories(url, group)
     begun = 0
     for block in blocks.indices:
         names = {blocks.chunk(name, block): name for name in blocks.further}
         known |= names.keys()
         status = blocks.chunk("status", block)
         if status not in present:
-            begun += block in histories
-            if block in merged:
+            begun += block in group.attempts
+            if block in group.finished:
                 found.findings.append(Finding("missing", status, "the ledger of a block that was done"))
                 group.bad_blocks.add(block)
             continue
         found.blocks += 1
         contents = {names[name]: content for name, content in read_many(url, names)}
-        faults = list(_faults(group, block, histories.get(block, []), contents))
+        faults = list(_faults(group, block, contents))
         if faults:
             group.bad_blocks.add(block)
             found.findings += faults
@@ -199,30 +201,9 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
     return known
 
 
-def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[BlockIndex]]:
-    """Return the `History` of each block, and the blocks that have a merged record; use only intact records.
-
-    A record is merged only when its block is in the ledger.
-    """
-    known: dict[tuple[BlockIndex, int], Mapping[str, str]] = {}
-    merged = set()
-    for name, line in lines(url, group.blocks.series):
-        record, is_merged = decoded(line), name.endswith(".jsonl")
-        if record is None or not group.blocks.has(tuple(record["block"])):
-            continue
-        if is_merged or name not in group.bad_records:
-            known[tuple(record["block"]), record["attempt"]] = record.get("chunks", {})
-            merged |= {tuple(record["block"])} if is_merged else set()
-    found: dict[BlockIndex, History] = {}
-    for (block, _), chunks in sorted(known.items(), key=itemgetter(0)):
-        found.setdefault(block, []).append(chunks)
-    return found, merged
-
-
-def _faults(
-    group: Group, block: BlockIndex, history: History, contents: Mapping[str, bytes | None]
-) -> Iterator[Finding]:
+def _faults(group: Group, block: BlockIndex, contents: Mapping[str, bytes | None]) -> Iterator[Finding]:
     """Yield the faults of a block that is in the ledger."""
+    history = [chunks for _, chunks in sorted(group.attempts.get(block, {}).items())]
     if not history:
         yield Finding("missing", name_of(group.blocks.series, block, 1), "the record of a block that is done")
         return
@@ -239,7 +220,7 @@ def _faults(
             yield Finding("damaged", file, "of an earlier attempt" if is_older else "not what was written")
 
 
-def _expected(history: History, status: str, name: str) -> set[str]:
+def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> set[str]:
     """Return the digests that the chunk of an array may have; `status` is the digest of the ledger of the same block.
 
     Normally, the attempt that wrote this ledger has also written the chunk. If that attempt wrote only the ledger, the
