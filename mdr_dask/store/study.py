@@ -47,8 +47,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
     """Return the metadata of a study, or None if they have no digest in the record of the layout or are not safe."""
     root = parsed(content)
-    attributes = root.get("attributes", {}) if isinstance(root, dict) else None
-    if not isinstance(attributes, dict):
+    if not isinstance(root, dict) or not isinstance(attributes := root.get("attributes", {}), dict):
         return None
     layout = attributes.get("mdr_dask_layout", LAYOUT + 1)
     if only_claimed(attributes) or (isinstance(layout, int) and layout > LAYOUT):
