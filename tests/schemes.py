@@ -1,6 +1,7 @@
-"""Solve steady sliding on a line given by heights and slopes at its nodes."""
+"""Solve steady sliding and velocity jumps on a line given by heights and slopes at its nodes."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -9,6 +10,11 @@ from mdr_dask.physics.sliding import steady, viscoelastic
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.transients.elements.foundation import foundation
+from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
+from mdr_dask.physics.transients.velocity_jump import jump_between
+
+KELVIN = foundation([], [], 1.0)
 
 
 def rough_line(points, oversampling, hurst=0.7, seed=3, realisation=1):
@@ -41,7 +47,6 @@ class InUnits:
     contact_slope: float
     error: float
     status: Outcome
-    sweeps: int
 
 
 def material_on_line(height, spacing, solid, velocity, normal_force, periodic=True):
@@ -56,4 +61,12 @@ def material_on_line(height, spacing, solid, velocity, normal_force, periodic=Tr
     found = viscoelastic.steady_viscoelastic_sliding(line, travelling, load)
     drag, depth, fraction, slope = found.values
     error = found.errors[0] / abs(drag) if drag else found.errors[0]
-    return InUnits(drag / load / length, depth, fraction, slope / length, error, found.status, found.sweeps)
+    return InUnits(drag / load / length, depth, fraction, slope / length, error, found.status)
+
+
+def velocity_jump(line, load, deborah, request):
+    """Return the steady limits and the transient of a velocity jump of a Kelvin foundation."""
+    prepared, loads, numbers = PreparedLine.of(line), np.array([load]), np.array([deborah])
+    (limits,) = steady_limits(prepared, loads, numbers)
+    jump = jump_between(prepared, load, numbers[0], limits, request)
+    return SimpleNamespace(**limits._asdict() | jump._asdict())

@@ -33,11 +33,6 @@ class LinearSolid:
     times: FloatArray
     viscosity: float = 0.0
 
-    @property
-    def glass_modulus(self) -> float:
-        """Shear modulus at a sudden strain, without the dashpot, Pa."""
-        return float(self.static_modulus + self.moduli.sum())
-
 
 def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
     """Return the Kelvin solid of modulus G, Pa, and relaxation time tau = eta / G, s."""
@@ -284,33 +279,6 @@ def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy
 def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
     """Multiply all relaxation times, and the viscosity of the dashpot, by a_T; return the new solid."""
     return replace(solid, times=solid.times * factor, viscosity=solid.viscosity * factor)
-
-
-@dataclass(frozen=True)
-class Recovery:
-    """Free recovery (zero stress) of a solid as a sum of decaying modes.
-
-    In mode k, the strain at the time t is u = c_k exp(-t / lambda_k), with lambda_k = ``times[k]``. The stretch of
-    Prony term m in this mode is u - a_m = stretch[m, k] u, where a_m is the strain of the dashpot of the term. The
-    strain of mode k is c_k = amplitude[k] @ (u - a) if the stretches u - a belong to a state of zero stress.
-    """
-
-    times: FloatArray
-    stretch: FloatArray
-    amplitude: FloatArray
-
-
-def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
-    """Return the modes of free recovery of a solid with the static modulus 1 and ascending, distinct relaxation times.
-
-    The modes are orthogonal with the weights G_m / tau_m. Therefore `amplitude`, the inverse of `stretch`, has a closed
-    form.
-    """
-    zeros, distance = recovery_times(moduli * times, times)
-    stretch = times[:, None] / distance
-    norm = np.sum((moduli * times)[:, None] / distance**2, axis=0)
-    amplitude = (moduli[:, None] / distance / norm).T.copy()
-    return Recovery(zeros, stretch, amplitude)
 
 
 @jit

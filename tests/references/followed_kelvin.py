@@ -1,10 +1,10 @@
 """Follow every element of a Kelvin foundation in time, from given displacements."""
 
 import numpy as np
+from schemes import KELVIN
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.foundation import KELVIN
 from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, untouched
 from mdr_dask.physics.transients.elements.steps import Schedule, under_elements
 

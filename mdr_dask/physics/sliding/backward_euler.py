@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
-from mdr_dask.physics.sliding.cases import Cases
+from mdr_dask.physics.sliding.cases import Cases, first_depths
 
 ITERATIONS = 200
 COARSENING = 8  # in the search for the depth, each grid has this many times as many nodes as the previous grid
@@ -81,13 +81,6 @@ class Lanes(NamedTuple):
     packed: FloatArray
     queue: IntArray
     sums: FloatArray
-
-
-@jit
-def lanes_for(cases: int) -> Lanes:
-    """Return the work arrays of a sweep."""
-    packed = np.empty((ROWS + 2, cases + LANES))
-    return Lanes(np.empty((ROWS, cases)), packed, np.empty(cases, np.int64), np.empty((SUMS, cases)))
 
 
 @jit
@@ -234,7 +227,9 @@ def _newton(
     The drag is extrapolated from the last two sweeps to the final depth. If no depth is found, the drag is NaN.
     """
     count = depths.size
-    active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
+    active, before = np.arange(count), np.full((2, count), np.nan)
+    packed, queue = np.empty((ROWS + 2, count + LANES)), np.empty(count, np.int64)
+    lanes = Lanes(np.empty((ROWS, count)), packed, queue, np.empty((SUMS, count)))
     depth, load, deborah = depths.copy(), cases.loads.copy(), cases.deborah.copy()
     decay = deborah / (1 + deborah)
     workspace, sums = lanes.state, lanes.sums
@@ -302,8 +297,7 @@ def steady_by_steps(
     strides = [1]
     while height.size > COARSEST * strides[-1]:
         strides.append(strides[-1] * COARSENING)
-    mean = loads / height.size
-    depths = np.maximum(mean, mean ** (2 / 3))
+    depths = first_depths(loads / height.size)
     drags, outside = np.empty(loads.size), np.zeros(loads.size, np.bool_)
     top = int(np.argmax(height))
     for stride in reversed(strides):

@@ -28,6 +28,11 @@ class Cases(NamedTuple):
         return Cases(self.deborah[cases], self.loads[cases])
 
 
+def first_depths(loads: FloatArray) -> FloatArray:
+    """Return first guesses of the penetration of the highest point, from loads F_N / (4 G L)."""
+    return np.maximum(loads, loads ** (2 / 3))
+
+
 @dataclass(frozen=True)
 class Steady:
     """Steady states; entry k of each array belongs to case k.

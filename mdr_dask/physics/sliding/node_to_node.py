@@ -24,7 +24,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution
-from mdr_dask.physics.sliding.cases import Cases
+from mdr_dask.physics.sliding.cases import Cases, first_depths
 from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
@@ -626,7 +626,7 @@ class NodeToNode:
             self._line = with_summit(nodes(self._height, self._slope, first, 1, True, ends))
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
-        depths = np.where(depths > 0, depths, _shallow(some.loads))
+        depths = np.where(depths > 0, depths, first_depths(some.loads))
         _search(self._line, weights(level // 2), some, LAST_STEP, self._error, depths, rates, results)
         self._depth[cases], self._rates[cases] = depths - top, rates
         return self._solution(results, depths - top, level)
@@ -637,7 +637,7 @@ class NodeToNode:
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
             strides.append(strides[-1] * COARSENING)
-        depths, results = _shallow(loads), np.empty((loads.size, SECANTS))
+        depths, results = first_depths(loads), np.empty((loads.size, SECANTS))
         highest = int(np.argmax(height))
         for stride in reversed(strides):
             results.fill(np.nan)
@@ -662,8 +662,3 @@ class NodeToNode:
         unseen = np.full((4, drag.size), ARITHMETIC)
         unseen[2:] += patch, 0.5 * patch
         return Solution([drag, depth, fraction, slope], outcome, unseen)
-
-
-def _shallow(loads: FloatArray) -> FloatArray:
-    """Return a first guess of the penetration of the summit."""
-    return np.maximum(loads, loads ** (2 / 3))

@@ -60,7 +60,7 @@ class Request:
     smallest number that meets the accuracy. The scheme for a Kelvin solid is "hermite" (cubic cells) or
     "backward_euler" (the time steps of the papers). `with_errors` is only used for a Kelvin solid on a given grid; in
     all other cases the errors are always estimated. `contact` states whether contact fraction and contact slope are
-    requested, which need finer grids than the other results. The errors of results that are not requested are infinite.
+    requested, which need finer grids than the other results.
     """
 
     accuracy: float = 0.01
@@ -97,7 +97,8 @@ def solve(
     if grid == "auto":
         return _to_accuracy(line, cases, request)
     if request.with_errors and request.scheme == "hermite" and grid > 1:
-        return _steady(_swept(line, cases, request, (grid // 2, grid), np.inf))
+        refined = _swept(line, cases, request, (grid // 2, grid), np.inf)
+        return Steady.of(np.array(refined.values), refined.outcome), refined.errors
     found = _on_grid(line, cases, request, grid, None)
     errors = np.full((4, loads.size), np.inf)
     if request.with_errors:
@@ -164,10 +165,6 @@ def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntA
     some = cases[better]
     columns[:, some] = np.array(found.values)[:, better]
     errors[:, some], status[some] = found.errors[:, better], found.outcome[better]
-
-
-def _steady(found: Refined) -> tuple[Steady, FloatArray]:
-    return Steady.of(np.array(found.values), found.outcome), found.errors
 
 
 def _in_full_contact(

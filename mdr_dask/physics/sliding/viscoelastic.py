@@ -17,14 +17,14 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution, refine
 from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_line
-from mdr_dask.physics.solids import LinearSolid, recovery
+from mdr_dask.physics.solids import LinearSolid, recovery_times
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
 LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step; far below the error of the step
 SWEEPS = 80
 DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one step
-SHORTEST = 1e-9  # in cells; the dashpot and all Prony terms with a smaller tau_m v become one term: see `_travelling`
+SHORTEST = 1e-9  # in cells; the dashpot and all Prony terms with a smaller tau_m v become one term: see `travelling`
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
 ORDER = 2.0  # order of convergence without extrapolation; with extrapolation it is higher if many cells are in contact
 
@@ -37,13 +37,12 @@ class ViscoelasticSteady:
 
     The four values are F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (for an indenter:
     of the points of height 0); fraction of the line in contact; and rms slope of the part of the line in contact. The
-    errors are absolute discretisation errors, and `sweeps` is the number of sweeps on the finest line.
+    errors are absolute discretisation errors.
     """
 
     values: FloatArray
     errors: FloatArray
     status: Outcome
-    sweeps: int
 
 
 def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
@@ -93,7 +92,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     found = refine(solve, 1, (cells // 2, cells), np.inf, ORDER, floors=np.array([0.0, np.std(height), 0.0, 0.0]))
     values = np.concatenate(found.values)
     values[DEPTH] += (line.height[:cells].mean() - height[:-1].mean()) if line.periodic else 0.0
-    return ViscoelasticSteady(values, found.errors[:, 0], Outcome(int(found.outcome[0])), case.sweeps)
+    return ViscoelasticSteady(values, found.errors[:, 0], Outcome(int(found.outcome[0])))
 
 
 class ViscoelasticCase:
@@ -103,11 +102,9 @@ class ViscoelasticCase:
         if not (np.isfinite(load) and load > 0):
             raise ValueError(f"the load must be positive and finite, got {load!r}")
         self._solid, self._load = solid, load
-        self._state: FloatArray | None = (
-            None  # entries: stretches of the Prony terms at the first node, penetration of the highest node
-        )
+        # stretches of the Prony terms at the first node, and penetration of the highest node
+        self._state: FloatArray | None = None
         self._before: FloatArray | None = None  # results on the previous grid
-        self.sweeps = 0
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
         """Solve the case on the next finer grid; all results except the first are extrapolated from the last two grids.
@@ -117,10 +114,10 @@ class ViscoelasticCase:
         cells = height.size - 1
         summit = float(np.max(height))
         below, load = np.ascontiguousarray(height - summit), self._load * cells
-        travelling = _travelling(self._solid, 1 / cells)
+        solid = travelling(self._solid, 1 / cells)
         outcome, values = Outcome.DEPTH_NOT_FOUND, np.full(4, np.nan)
-        for start in (self._state, None) if self._state is not None else (None,):
-            outcome, state, values = self._solve(below, load, travelling, periodic, start)
+        for start in [None] if self._state is None else [self._state, None]:
+            outcome, state, values = self._solve(below, load, solid, periodic, start)
             if outcome != Outcome.DEPTH_NOT_FOUND:
                 break
         self._state = state if outcome == Outcome.CONVERGED else None
@@ -149,16 +146,16 @@ class ViscoelasticCase:
             depth = static_depth(inner, load)
             start = np.append(np.full(terms, depth - load / inner.size), depth)
         unknown, totals = start.copy(), np.empty(6)
-        converged, self.sweeps, inside = solve_sliding(below, load, periodic, solid, TOLERANCE, unknown, totals)
-        imbalance = abs(float(totals[1]) / load - 1)
-        good = converged and imbalance < BALANCE and unknown[-1] > 0
-        outcome = Outcome.CONVERGED if good else Outcome.DEPTH_NOT_FOUND
+        outcome = Outcome(solve_sliding(below, load, periodic, solid, unknown, totals))
+        is_balanced = abs(float(totals[1]) / load - 1) < BALANCE and unknown[-1] > 0
+        if outcome == Outcome.CONVERGED and not is_balanced:
+            outcome = Outcome.DEPTH_NOT_FOUND
         slope = cells * np.sqrt(totals[4] / totals[3]) if totals[3] > 0 else 0.0
         values = np.array([totals[2], unknown[-1], totals[3] / cells, slope])
-        return (outcome if inside else Outcome.OUTSIDE_LINE), unknown, values
+        return outcome, unknown, values
 
 
-def _travelling(solid: LinearSolid, cell: float) -> Travelling:
+def travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths in cells and stresses divided by the static modulus.
 
     The dashpot, and all Prony terms that relax within a very small fraction of a cell, are replaced by one Prony term
@@ -172,8 +169,11 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
         shortest = SHORTEST / 10
         moduli = np.append(viscosity / cell / shortest, moduli)
         deborah = np.append(shortest, deborah)
-    modes = recovery(moduli, deborah)
-    return Travelling(moduli, deborah, modes.times, modes.stretch.T.copy(), modes.amplitude.T.copy())
+    times, distance = recovery_times(moduli * deborah, deborah)
+    stretch = deborah[:, None] / distance  # of every term (row) in every mode (column) of strain 1
+    # the modes are orthogonal with the weights moduli / deborah, so that the inverse of `stretch` has a closed form
+    norm = np.sum((moduli * deborah)[:, None] / distance**2, axis=0)
+    return Travelling(moduli, deborah, times, stretch.T.copy(), moduli[:, None] / distance / norm)
 
 
 class Swept(NamedTuple):
@@ -189,9 +189,7 @@ class Swept(NamedTuple):
 
 
 @jit
-def follow(
-    direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
-) -> None:  # pragma: no cover
+def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray) -> None:
     """Multiply the matrix of derivatives of a Newton step by given changes of the unknowns.
 
     The entries of `direction` are changes of the stretches e_m at the start of the line, and of the depth. `product`
@@ -229,7 +227,7 @@ def follow(
 
 
 @jit
-def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
+def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:
     """Propagate a change of state through the sudden change of strain to zero stress, at the start of free recovery.
 
     The strains of the dashpots stay the same.
@@ -247,7 +245,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
 
 
 @jit
-def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
+def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:
     """Return `Swept.decayed`, shape (pieces, terms), for contacts and free recoveries of the given lengths."""
     decayed = np.empty((lengths.size, deborah.size))
     for piece in range(lengths.size):
@@ -258,9 +256,7 @@ def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> Floa
 
 
 @jit
-def newton_step(
-    residual: FloatArray, scale: FloatArray, swept: Swept, workspace: FloatArray, step: FloatArray
-) -> None:  # pragma: no cover
+def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace: FloatArray, step: FloatArray) -> None:
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
     `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u, and `scale` the
@@ -294,7 +290,7 @@ def newton_step(
 
 
 @jit
-def _dot(one: FloatArray, other: FloatArray) -> float:  # pragma: no cover
+def _dot(one: FloatArray, other: FloatArray) -> float:
     total = 0.0
     for k in range(one.size):
         total += one[k] * other[k]
@@ -302,7 +298,7 @@ def _dot(one: FloatArray, other: FloatArray) -> float:  # pragma: no cover
 
 
 @jit
-def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
+def static_depth(profile: FloatArray, strain_area: float) -> float:
     """Return the depth at which the sum of all positive penetrations depth + profile is `strain_area`."""
     depth = 0.0
     for value in profile:
@@ -330,22 +326,19 @@ def solve_sliding(
     strain_area: float,
     periodic: bool,
     solid: Travelling,
-    tolerance: float,
     unknown: FloatArray,
     totals: FloatArray,
-) -> tuple[bool, int, bool]:  # pragma: no cover
+) -> int:
     """Find the depth at a given load, and on a periodic line also the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
     integral of u: `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing function of the
-    unknowns. Therefore, after the first step, Newton's method approaches the solution from above. The iteration ends
-    after a step of at most `tolerance` times the depth.
+    unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
 
     Heights are relative to the highest node, which is the first and the last node of a periodic line. On any other
     line, elements enter undeformed and recover behind the end of the line, so that the depth is the only unknown.
     `unknown` contains the stretches e_m at the first node, then the depth: first guesses, replaced by the solution.
-    `totals` is that of `Passage`. The results are: whether the method converged, the number of sweeps, and False if an
-    element is in contact at the end of a line that is not periodic.
+    `totals` is that of `Passage`. Return an `Outcome`; a line that is not periodic must not end in contact.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     terms, nodes = moduli.size, profile.size
@@ -359,7 +352,7 @@ def solve_sliding(
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
     rounding = 1e-15 * nodes * steepest  # error of a height due to the rounding error of a position
-    for sweeps in range(1, SWEEPS + 1):
+    for _ in range(SWEEPS):
         for i in range(nodes):
             penetration[i] = unknown[terms] + profile[i]
         start = unknown[:terms]
@@ -384,7 +377,7 @@ def solve_sliding(
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]
         if not np.isfinite(largest):
-            return False, sweeps, True
-        if largest <= tolerance * unknown[terms] + rounding:
-            return True, sweeps, periodic or end == CLOSED
-    return False, SWEEPS, True
+            break
+        if largest <= TOLERANCE * unknown[terms] + rounding:
+            return Outcome.CONVERGED if periodic or end == CLOSED else Outcome.OUTSIDE_LINE
+    return Outcome.DEPTH_NOT_FOUND

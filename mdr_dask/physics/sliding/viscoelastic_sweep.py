@@ -34,7 +34,7 @@ class Travelling(NamedTuple):
 
 
 @jit
-def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
+def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:
     """Write the product of a matrix and a vector; ``columns[k]`` is column k of the matrix."""
     product[:] = 0.0
     for k in range(vector.size):
@@ -44,9 +44,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 
 
 @jit
-def step_factors(
-    length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
-) -> None:  # pragma: no cover
+def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray) -> None:
     """Write the factors `decay`, `gain` and `area` of every Prony term over a straight piece of the given length.
 
     From the stretch e at the start of the piece follow the stretch decay * e + gain * slope at its end, and the
@@ -68,7 +66,7 @@ def step_factors(
 @jit
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
-) -> tuple[float, float]:  # pragma: no cover
+) -> tuple[float, float]:
     """Return the stress and its derivative at the distance `length` from the start of a straight piece."""
     pressure, rate = start + slope * length, slope
     for m in range(moduli.size):
@@ -81,7 +79,7 @@ def _pressure_inside(
 @jit
 def separation_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
-) -> float:  # pragma: no cover
+) -> float:
     """Return the place between 0 and `end` where the stress falls to zero, by Newton's method and bisection."""
     low, high = 0.0, end
     point = min(0.5 * end, deborah[0]) if deborah.size else 0.5 * end  # deborah[0] is the shortest decay length
@@ -101,9 +99,7 @@ def separation_point(
 
 
 @jit
-def contact_point(
-    low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
-) -> float:  # pragma: no cover
+def contact_point(low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray) -> float:
     """Return the place t where a free element meets the straight line start + slope (t - low), with low <= t <= high.
 
     The strain of a free element is a convex function of t. Newton's method therefore converges from `low` without
@@ -128,7 +124,7 @@ def contact_point(
 
 
 @jit
-def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
+def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:
     """Return the strain of a free element after a distance, and its derivative."""
     strain, rate = 0.0, 0.0
     for k in range(times.size):
@@ -141,7 +137,7 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 @jit
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
-) -> float:  # pragma: no cover
+) -> float:
     """Return the position where an element that is free from `place` on meets the line again, or -1.
 
     The search begins in the cell that ends at `node`. After contact has ended inside a cell this must be the next cell,
@@ -190,7 +186,7 @@ def sweep_line(
     undeformed: bool,
     passage: Passage,
     workspace: FloatArray,
-) -> tuple[int, int]:  # pragma: no cover
+) -> tuple[int, int]:
     """Move an element once along the line, and write the lengths and integrals to `passage`.
 
     `start` contains the stretches e_m at the first node, for an element whose displacement is the penetration there. If
@@ -248,7 +244,7 @@ def _contact(
     imbalance: FloatArray,
     totals: FloatArray,
     workspace: FloatArray,
-) -> tuple[float, float, float, bool]:  # pragma: no cover
+) -> tuple[float, float, float, bool]:
     """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
 
     Return the place, strain and remaining stress there, and True if the contact ends, False if the line ends. The
@@ -298,7 +294,7 @@ def _contact(
 @jit
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
-) -> float:  # pragma: no cover
+) -> float:
     """Write the stretches at the end of a straight piece, and return the stress there; the strain there is `strain`."""
     pressure = strain
     for m in range(moduli.size):
@@ -310,7 +306,7 @@ def _stretch(
 @jit
 def _begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
-) -> None:  # pragma: no cover
+) -> None:
     """Write the recovery modes of an element after its strain has suddenly decreased from `strain` by `excess`.
 
     The stretch of the fastest Prony term is adjusted so that the stress is exactly zero.
@@ -334,7 +330,7 @@ def _add_recovery(
     e: FloatArray,
     imbalance: FloatArray,
     totals: FloatArray,
-) -> None:  # pragma: no cover
+) -> None:
     """Advance the modes over a free recovery.
 
     The integral of u is added to `totals`, the integrals of the stretches are added to `imbalance`, and the final

@@ -113,7 +113,7 @@ def solve_jumps(
         fine = limits[grid, int(k)]
         jump = jump_between(lines[grid], loads[k], deborah[k], fine, march)
         jumps.outcome[k] = jump.outcome
-        trace[k] = levels.after[k] + (jump.trace - jump.after)
+        trace[k] = levels.after[k] + (jump.trace - fine.after)
         depth[k] = levels.depth[k] + (jump.depth - fine.depth[1])
         if with_errors and jump.outcome == Outcome.CONVERGED:
             error = _left_out(jump, fine, march)

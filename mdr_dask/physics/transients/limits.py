@@ -27,9 +27,7 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-# The barriers of several velocities are kept, for at most KEPT_CELLS cells in total (16 bytes for each cell). For long
-# lines this limit does not apply: the barriers of up to KEPT_SPEEDS velocities are always kept.
-KEPT_CELLS, KEPT_SPEEDS = 2**21, 4
+KEPT = 4  # number of velocities whose barriers are kept; successive cases often have the same velocities
 WHOLE = 1 - 1e-12  # contact counts as full if at least this fraction of the line is in contact
 NEWTON_STEPS = 60
 NEARLY = 1e-6  # largest relative error of the load before the last Newton step; the step squares this error
@@ -53,9 +51,9 @@ class PreparedLine(NamedTuple):
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers for a Deborah number v tau in cells, which successive cases often share."""
+        """Return the barriers for a Deborah number v tau in cells."""
         if deborah not in self.known:
-            if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):
+            if len(self.known) >= KEPT:
                 self.known.clear()
             self.known[deborah] = barriers_for(int(self.track.cells))
         return self.known[deborah]

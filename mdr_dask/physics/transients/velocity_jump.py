@@ -15,9 +15,8 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
-from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
-from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, steady_limits
+from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
@@ -108,49 +107,31 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
 
 
 class Jump(NamedTuple):
-    """Friction before, at and after a velocity jump.
+    """Drag F_x / (4 G L) and depth at the requested times after a velocity jump.
 
-    Drags are F_x / (4 G L), in the unit of height squared divided by the unit of length. `before`, `at` and `after`
-    belong to steady sliding at v_1, to the time just after the jump, and to steady sliding at v_2. `trace` and `depth`
-    are drag and depth at the requested times. `path` is None if there was no march. `left_out` is the estimated size of
-    a transient that was not marched because it is smaller than the allowed error; otherwise 0.
+    `path` is None if there was no march. `left_out` is the estimated size of a transient that was not marched because
+    it is smaller than the allowed error; otherwise 0.
     """
 
-    before: float
-    at: float
-    after: float
     trace: FloatArray
     depth: FloatArray
     path: Path | None
     left_out: float
     outcome: Outcome
 
-    @property
-    def moments(self) -> int:
-        """Number of computed moments."""
-        return 0 if self.path is None else self.path.time.size
-
-
-def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], request: MarchRequest) -> Jump:
-    """Return the friction of a Kelvin foundation on a periodic line before and after a velocity jump at constant load.
-
-    The load is F_N / (4 G L), in the unit of height. `deborah` contains v_1 tau / L and v_2 tau / L.
-    """
-    prepared, loads, numbers = PreparedLine.of(line), np.array([load]), np.array([deborah])
-    return jump_between(prepared, load, numbers[0], steady_limits(prepared, loads, numbers)[0], request)
-
 
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return the friction before and after one jump, from the known steady states; arguments as in `velocity_jump`."""
+    """Return the friction of a Kelvin foundation after one velocity jump at constant load, from its steady limits.
+
+    The load is F_N / (4 G L), in the unit of height. `deborah` contains v_1 tau / L and v_2 tau / L.
+    """
     times = request.times
     if limits.outcome != Outcome.CONVERGED:
         return _failed(times, limits.outcome)
-    after = np.full(times.size, limits.after)
-    settled = Jump(
-        limits.before, limits.at, limits.after, after, np.full(times.size, limits.depth[1]), None, 0.0, limits.outcome
-    )
+    after, depth = np.full(times.size, limits.after), np.full(times.size, limits.depth[1])
+    settled = Jump(after, depth, None, 0.0, limits.outcome)
     if limits.is_full:  # in full contact u = d + h and the depth is constant: there is no transient
         return settled
     relaxation = _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request)
@@ -167,7 +148,7 @@ def jump_between(
 
 def _failed(times: FloatArray, outcome: Outcome) -> Jump:
     nothing = np.full(times.size, np.nan)
-    return Jump(np.nan, np.nan, np.nan, nothing, nothing, None, 0.0, outcome)
+    return Jump(nothing, nothing, None, 0.0, outcome)
 
 
 class _Relaxation(NamedTuple):

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from schemes import on_line, rough_line
+from schemes import KELVIN, on_line, rough_line, velocity_jump
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
+from mdr_dask.physics.transients.elements.foundation import Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, steady_start
 from mdr_dask.physics.transients.elements.steps import Schedule
-from mdr_dask.physics.transients.velocity_jump import MarchRequest, velocity_jump
+from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 POINTS = 50
 STANDARD = foundation([3.0], [0.25], 0.0)

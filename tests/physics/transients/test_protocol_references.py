@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from schemes import KELVIN
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line, without_kinks
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
+from mdr_dask.physics.transients.elements.foundation import Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, steady_start
 from mdr_dask.physics.transients.elements.steps import Schedule
 

@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from schemes import on_line, rough_line
+from schemes import KELVIN, on_line, rough_line, velocity_jump
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.foundation import KELVIN
 from mdr_dask.physics.transients.elements.loading_history import Piece, trace
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
-from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, velocity_jump
+from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 POINTS, OVERSAMPLING = 100, 8
 DEBORAH, LOAD = 0.1, 0.3
@@ -23,12 +22,12 @@ def line(oversampling: int = OVERSAMPLING) -> tuple[np.ndarray, np.ndarray]:
     return rough_line(POINTS, oversampling)
 
 
-def solved(height, slope, load, deborahs, times, per_decade=24, wavenumber=WAVENUMBER) -> Jump:
+def solved(height, slope, load, deborahs, times, per_decade=24, wavenumber=WAVENUMBER):
     request = MarchRequest(times, wavenumber, per_decade, 0.0)
     return velocity_jump(periodic_line(height, slope), load, deborahs, request)
 
 
-def jump(change: float = 0.2, per_decade: float = 24, oversampling: int = OVERSAMPLING) -> Jump:
+def jump(change: float = 0.2, per_decade: float = 24, oversampling: int = OVERSAMPLING):
     return solved(*line(oversampling), LOAD, (DEBORAH, DEBORAH * (1 + change)), TIMES, per_decade)
 
 

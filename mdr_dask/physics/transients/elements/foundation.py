@@ -56,9 +56,6 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     return Foundation(g, tau, float(viscosity), 1 / zeros, modes, inward, modes.T @ load)
 
 
-KELVIN = foundation([], [], 1.0)
-
-
 class Lapse(NamedTuple):
     """A duration, the decay during it, and work arrays for one element.
 

@@ -36,14 +36,12 @@ LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at 
 class Response(NamedTuple):
     """Forces and depth at every moment of a loading history, and the state of the elements at the end.
 
-    The drag is F_x / (4 G L), in the unit of height squared divided by the unit of length. `rate` is the derivative of
-    the depth with respect to time, and `contact` the fraction of the line in contact. Another history can continue from
-    `state`.
+    The drag is F_x / (4 G L), in the unit of height squared divided by the unit of length. `contact` is the fraction of
+    the line in contact. Another history can continue from `state`.
     """
 
     drag: FloatArray
     depth: FloatArray
-    rate: FloatArray
     contact: FloatArray
     status: Outcome
     state: State
@@ -182,10 +180,10 @@ def follow_line(
     interpolated linearly between elements, which is most accurate for a line without kinks. `state` and `depth` belong
     to the first moment; they are not changed.
     """
-    now, out = deepcopy(state), np.full((4, schedule.moments.size), np.nan)
+    now, out = deepcopy(state), np.full((3, schedule.moments.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
-    drag, depths, rate, contact = out
-    return Response(drag, depths, rate, contact, Outcome(status), now)
+    drag, depths, contact = out
+    return Response(drag, depths, contact, Outcome(status), now)
 
 
 MOST_STEPS = 400_000  # largest number of steps in one piece of a history

@@ -18,7 +18,6 @@ from mdr_dask.physics.transients.elements.foundation import (
     Lapse,
     advance,
     at_rest,
-    fading,
     free_after,
     lapse_of,
     pull,
@@ -37,24 +36,6 @@ class Edges(NamedTuple):
 
     place: FloatArray
     gap: FloatArray
-
-
-class Contact(NamedTuple):
-    """Elements under a line at one moment, shape (n,) each, and the edges of their contact.
-
-    `gaps` is the height of the line above the position that an element would have without contact; without a dashpot,
-    it contains the same numbers as `pulls`. `pulls` is the force of spring and Prony terms of an element that follows
-    the line, and `slope` the slope of the line. `force` and `power` are results: the total force, and its product with
-    the slope.
-    """
-
-    gaps: FloatArray
-    pulls: FloatArray
-    slope: FloatArray
-    force: FloatArray
-    power: FloatArray
-    touching: BoolArray
-    edges: Edges
 
 
 class Drive(NamedTuple):
@@ -173,19 +154,19 @@ def _cell(
 
 
 @jit
-def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
+def _forces(state: State, workspace: StepWorkspace, first: int, keep: bool) -> tuple[float, float, float]:
     """Return the mean load, the mean drag and the fraction of the line in contact; write the edges if `keep` is True.
 
     The cell before the element `first` does not exist.
     """
-    force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
-    n = force.size
+    force, power, slope, gaps = workspace.force, workspace.power, workspace.slope, workspace.gaps
+    n, touching, edges = force.size, state.touching, state.edges
     load, drag, length = 0.0, 0.0, 0.0
     for j in range(n):
         if j == first or not (touching[j - 1] or touching[j]):
             edges.place[j] = -1.0
             continue
-        low, high = _cell(j, contact.gaps, force, touching, edges, keep)
+        low, high = _cell(j, gaps, force, touching, edges, keep)
         width, middle = high - low, 0.5 * (low + high)
         if width >= 1:
             load += _whole(force, j)
@@ -201,17 +182,19 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
 
 
 @jit
-def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
+def _pressing_rate(state: State, workspace: StepWorkspace, weight: float, deborah: float) -> float:
     """Return the smallest rate of the depth at which no element in contact has a negative force."""
-    rate = -np.inf
-    for j in range(contact.force.size):
-        if contact.touching[j]:
-            rate = max(rate, -contact.pulls[j] / weight - deborah * contact.slope[j])
+    rate, pulls, slope = -np.inf, workspace.pulls, workspace.slope
+    for j in range(pulls.size):
+        if state.touching[j]:
+            rate = max(rate, -pulls[j] / weight - deborah * slope[j])
     return rate
 
 
 @jit
-def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
+def _carrying_rate(
+    state: State, workspace: StepWorkspace, weight: float, rate: float, drive: Drive
+) -> tuple[float, float, float]:
     """Find the rate of the depth at which the elements carry the load, and write the edges of contact.
 
     Return this rate, the drag and the fraction of the line in contact. The force of an element pressed to the line is
@@ -219,24 +202,24 @@ def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) ->
     rate of the depth. Without a dashpot, `weight` is the glass modulus, `rate` a correction of the depth, and `deborah`
     0.
     """
-    force, power, slope = contact.force, contact.power, contact.slope
+    force, power, slope, pulls = workspace.force, workspace.power, workspace.slope, workspace.pulls
     drag, length = 0.0, 0.0
     for iteration in range(60):
         for j in range(force.size):
-            force[j] = contact.pulls[j] + weight * (rate + drive.deborah * slope[j])
+            force[j] = pulls[j] + weight * (rate + drive.deborah * slope[j])
             power[j] = force[j] * slope[j]
-        carried, drag, length = _forces(contact, drive.first, False)
+        carried, drag, length = _forces(state, workspace, drive.first, False)
         if abs(carried - drive.load) <= 1e-11 * drive.load or iteration == 59:
             break
         if length > 0:
             rate += (drive.load - carried) / (length * weight)
         else:
-            rate = max(rate, _pressing_rate(contact, weight, drive.deborah)) + drive.load / weight
-    _forces(contact, drive.first, True)
+            rate = max(rate, _pressing_rate(state, workspace, weight, drive.deborah)) + drive.load / weight
+    _forces(state, workspace, drive.first, True)
     return rate, drag, length
 
 
-DRAG, DEPTH, RATE, CONTACT = range(4)
+DRAG, DEPTH, CONTACT = range(3)
 CORRECTIONS = 2  # number of corrections of the times of separation and of the depth in a step
 
 
@@ -332,7 +315,9 @@ class StepWorkspace(NamedTuple):
 
     Heights (`under`) and slopes of the line belong to the end of the step, or, with the prefix `old_`, to its start.
     `after` is the displacement without contact at the end of the step. `parts` and `leaves` are results of
-    :func:`release`. The others are those of `Contact`.
+    :func:`release`. `gaps` is the height of the line above the position that an element would have without contact;
+    without a dashpot, it contains the same numbers as `pulls`. `pulls` is the force of spring and Prony terms of an
+    element that follows the line, `force` its total force, and `power` the product of this force and the slope.
     """
 
     under: FloatArray
@@ -450,12 +435,11 @@ def forces_now(
         w = depth + workspace.under[j]
         pulls[j] = pull(solid, w, state.terms, j)
         gaps[j] = w - state.free[j] if solid.viscosity > 0 else pulls[j]
-    contact = Contact(gaps, pulls, workspace.slope, workspace.force, workspace.power, state.touching, state.edges)
     if solid.viscosity > 0:
-        rate, drag, length = carrying_rate(contact, solid.viscosity, rate, drive)
+        rate, drag, length = _carrying_rate(state, workspace, solid.viscosity, rate, drive)
         return depth, rate, drag, length
     still = Drive(0.0, drive.load, drive.first)
-    more, drag, length = carrying_rate(contact, 1 + solid.moduli.sum(), 0.0, still)
+    more, drag, length = _carrying_rate(state, workspace, 1 + solid.moduli.sum(), 0.0, still)
     return depth + more, rate, drag, length
 
 
@@ -465,14 +449,10 @@ def follow_elements(
 ) -> int:
     """March all elements through the moments; return an `Outcome`.
 
-    `out`, shape (4, moments), receives the drag, the depth, its rate, and the fraction of the line in contact.
+    `out`, shape (3, moments), receives the drag, the depth, and the fraction of the line in contact.
     """
     moments, travels, deborahs, loads = schedule
-    workspace, lapse, modes = (
-        _workspace_for(solid, line.height.size - 1),
-        lapse_of(solid, 1.0),
-        np.empty(solid.rates.size),
-    )
+    workspace, modes = _workspace_for(solid, line.height.size - 1), np.empty(solid.rates.size)
     shift, rate = under_elements(line, travels[0], workspace.under, workspace.slope), 0.0
     if solid.viscosity == 0:
         depth, good = _load_instantly(solid, state, workspace.under, loads[0], depth)
@@ -487,16 +467,7 @@ def follow_elements(
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
                 _renew(state, old_shift, shift)
-            lapse = Lapse(
-                time,
-                lapse.decay,
-                lapse.fades,
-                lapse.part_decay,
-                lapse.part_fades,
-                lapse.modes,
-                lapse.strains,
-            )
-            fading(solid, time, lapse.decay, lapse.fades)
+            lapse = lapse_of(solid, time)
             mean = mean_after(solid, state, loads[now - 1], loads[now], time, modes)
             both = deborahs[now - 1], deborahs[now]
             depth, good = _step(solid, state, workspace, lapse, mean, old_depth, depth + rate * time, both)
@@ -511,7 +482,7 @@ def follow_elements(
         exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
         if length <= 0 and now > 0 and drive.load > 0:  # a loaded body must be in contact
             return Outcome.DEPTH_NOT_FOUND
-        out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
+        out[DRAG, now], out[DEPTH, now], out[CONTACT, now] = drag, exact, length
     return Outcome.CONVERGED
 
 
