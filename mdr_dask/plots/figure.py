@@ -151,7 +151,7 @@ class Figure:
         if law_holds.startswith("yes"):
             self.bars = f"{self.bars}; {law_holds}"
         else:
-            self.warnings = [*self.warnings, law_holds]
+            self.warnings = [*self.warnings, f"does the fit hold? {law_holds}"]
 
     def table(self) -> pd.DataFrame:
         """Return a table with a row for every point. ``x``, ``y`` and ``value`` are in the units of the axes,

@@ -30,8 +30,8 @@ SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.m
 #: An inch, and the smallest and largest side of a figure, in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
-#: Largest height, in inches, of a figure of requested width: 230 mm, as for the text of a journal page.
-TALLEST = 0.23 / INCH
+#: Width of a column and height of a page of a journal in inches.
+COLUMN, TALLEST = 0.085 / INCH, 0.23 / INCH
 
 
 @dataclass(frozen=True)

@@ -21,25 +21,8 @@ from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Panel, Trace, edges
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `WIDE`, `NARROW`:
-#: usual and least width of a panel in a figure whose width was requested.
-ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 3.0, 1.5
-#: Least height of a panel in inches, and largest number of panels in a row, unless the rows would not fit on a page.
-LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
-#: Largest height of a figure of requested width, divided by its width, unless a panel would be too low.
-SLENDER = 2.0
-#: Largest share of the height of the figure that the legend may occupy. Entries that do not fit are left out.
-LEGEND_SHARE = 0.35
-#: Least distance between the texts of two ticks, in points.
-GAP = 3
-#: Largest number of lines of a title. Texts that do not fit are left out.
-MOST_LINES = 7
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
-#: Position of the marks of cases without a value above the lower edge of a panel, as a fraction of its height.
-FOOT = 0.02
-#: Dots per inch of pictures for a screen and for print.
-DPI, PRINTED_DPI = 150, 300
 
 
 class Drawn(MplFigure):
@@ -63,7 +46,7 @@ class Drawn(MplFigure):
     def save(self, path: str | Path) -> None:
         """Write the figure to a file, and the table of the figure beside it: ``mu.pdf`` and ``mu.csv``."""
         beside = table_beside(path)
-        self.savefig(path, dpi=DPI if page.current().width is None else PRINTED_DPI)
+        self.savefig(path, dpi=150 if page.current().width is None else 300)
         with beside.open("w", encoding="utf-8", newline="") as stream:
             stream.writelines(f"# {line}\n" for line in self.description.head(self.origin))
             self.table().to_csv(stream, index=False, lineterminator="\n")
@@ -81,42 +64,45 @@ def render(description: Figure) -> Drawn:
     """Draw a figure with matplotlib and return it."""
     panels, asked = description.panels, page.current()
     rows, columns = _grid(description)
-    width = asked.width or (ALONE if columns == 1 else BESIDE * columns)
-    height = rows * max(LEAST_HEIGHT, description.ratio * width / columns)
+    width = asked.width or max(6.4, 4.2 * columns)
+    height = rows * max(_least_height(), description.ratio * width / columns)
     figure = Drawn(description, figsize=(width, asked.height or height))
     figure.set_layout_engine("constrained", w_pad=0.03, h_pad=0.03)
     places = _axes(figure, description, rows, columns)
     for axes, panel in zip(places, panels, strict=True):
         _draw_panel(axes, panel)
-    _share_labels(figure, places, panels)
+    _share_labels(places, panels)
     _bars(figure, places, panels)
-    _title(figure, description)
     traces = [trace for panel in panels for trace in panel.traces]
     markers = {trace.marker for trace in traces if not trace.line or trace.column("y").size < MANY_POINTS}
     keys = list(dict.fromkeys(key for panel in panels for key in panel.entries()))
     keys = [key if key.marker in markers else replace(key, marker="") for key in keys]
-    legend = _legend(figure, keys) if keys else 0.0
+    beside = _title(figure, description) + (_legend(figure, keys) if keys else 0.0)
     if asked.height is None:
-        beside = legend + _height_of_title(figure)
-        if asked.width:
-            most = max(SLENDER * width, rows * LEAST_HEIGHT + beside)
-            height = min(height, min(most, page.TALLEST) - beside)
-        figure.set_size_inches(width, height + beside)
+        figure.set_size_inches(width, min(height + beside, page.TALLEST) if asked.width else height + beside)
     _fit(figure, places)
     return figure
 
 
 def _grid(description: Figure) -> tuple[int, int]:
-    """Return the numbers of rows and columns of panels; at a requested width, the rows must fit on a page."""
+    """Return the numbers of rows and columns of panels.
+
+    On a screen, up to three columns are filled evenly. A requested width has as many columns as a journal, and up to
+    twice as many if the rows would not fit on a page.
+    """
     width, stack = page.current().width, description.stack
     stacks = -(-len(description.panels) // stack)
-    columns = MOST_COLUMNS if width is None else max(1, min(MOST_COLUMNS, int(width / WIDE)))
-    columns = min(2 if stacks == 4 else columns, columns, stacks)
+    most = 3 if width is None else max(1, round(width / page.COLUMN))
+    columns = -(-stacks // -(-stacks // most))
     if width is not None:
-        fitting = int(page.TALLEST / LEAST_HEIGHT)
-        while -(-stacks // columns) * stack > fitting and columns < min(stacks, int(width / NARROW)):
+        while columns < min(stacks, 2 * most) and -(-stacks // columns) * stack * _least_height() > page.TALLEST:
             columns += 1
     return -(-stacks // columns) * stack, columns
+
+
+def _least_height() -> float:
+    """Return the least height of a row of panels in inches: ten lines of text."""
+    return 10 * 1.2 * float(mpl.rcParams["font.size"]) / 72
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
@@ -132,7 +118,7 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
     return found
 
 
-def _share_labels(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
+def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
     """Remove the label of an axis that equals the axis of the panel below or on the left."""
     at = {}
     for axes, panel in zip(places, panels, strict=True):
@@ -145,10 +131,6 @@ def _share_labels(figure: Drawn, places: list[Axes], panels: list[Panel]) -> Non
             axes.set_xlabel("")
         if left and left[1].y == panel.y:
             axes.set_ylabel("")
-    if len({row for row, _ in at}) > 1 and all(panel.y == panels[0].y for panel in panels):
-        for axes in places:
-            axes.set_ylabel("")
-        figure.supylabel(panels[0].y.label, fontsize=mpl.rcParams["axes.labelsize"])
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
@@ -177,21 +159,13 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 def _log_ticks(axis: Any) -> None:
     """Set the ticks of a logarithmic axis; with less than two decades, plain numbers such as 1, 2, 5, 10 and 20."""
-    from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
     axis.set_minor_formatter(NullFormatter())
-    if not 0 < high < 100 * low:
-        axis.set_major_locator(LogLocator(numticks=8))
-        return
-    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
-    ticks = np.sort(np.ravel(decades[:, None] * np.array([1, 2, 5])))
-    ticks = ticks[(ticks >= low) & (ticks <= high)]
-    if ticks.size < 2:
-        ticks = np.array(MaxNLocator(4).tick_values(low, high))
-        ticks = ticks[(ticks >= low) & (ticks <= high)]
-    axis.set_major_locator(FixedLocator(ticks.tolist()))
-    axis.set_major_formatter(lambda value, _: f"{value:.4g}")
+    if 0 < high < 100 * low:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(lambda value, _: f"{value:.4g}")
 
 
 def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
@@ -245,7 +219,7 @@ def _map(axes: Axes, trace: Trace, panel: Panel) -> None:
 
 def _absent(axes: Axes, trace: Trace, _: Panel) -> None:
     x = trace.column("x")
-    place = np.full(x.size, FOOT)
+    place = np.full(x.size, 0.02)
     look: dict[str, Any] = {"color": trace.colour, "marker": trace.marker, "linestyle": "none"}
     axes.plot(x, place, transform=axes.get_xaxis_transform(), zorder=4, gid=trace.kind, **look)
 
@@ -269,7 +243,8 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
             _log_ticks(drawn.ax.yaxis)
 
 
-def _title(figure: Drawn, description: Figure) -> None:
+def _title(figure: Drawn, description: Figure) -> float:
+    """Write the title and return its height in inches. At a requested size, only warnings are written."""
     asked = page.current()
     if asked.title is not None:
         lines = [asked.title] if asked.title else []
@@ -279,21 +254,15 @@ def _title(figure: Drawn, description: Figure) -> None:
         lines = [part for part in about if part]
         lines += [f"warning: {warning}" for warning in description.warnings]
     if not lines:
-        return
+        return 0.0
     size = mpl.rcParams["axes.titlesize" if len(lines) == 1 else "legend.fontsize"]
-    shown: list[str] = []
-    for line in lines:
-        broken = _broken(figure, line, 0.97 * figure.get_figwidth(), size).split("\n")
-        if len(shown) + len(broken) > MOST_LINES:
-            shown.append("more: see the table beside the figure")
-            break
-        shown += broken
-    figure.suptitle("\n".join(shown), fontsize=size)
+    text = "\n".join(_broken(figure, line, 0.97 * figure.get_figwidth(), size) for line in lines)
+    return _height(figure, figure.suptitle(text, fontsize=size))
 
 
-def _height_of_title(figure: Drawn) -> float:
-    text = figure.get_suptitle()
-    return 1.3 / 72 * float(mpl.rcParams["font.size"]) * (text.count("\n") + 1) if text else 0.0
+def _height(figure: Drawn, artist: Any) -> float:
+    """Return the height of a text or a legend in inches."""
+    return float(artist.get_window_extent(figure.canvas.get_renderer()).height / figure.dpi)  # type: ignore[attr-defined]
 
 
 def _width_of(figure: Drawn, text: str, size: Any) -> float:
@@ -328,11 +297,11 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels and return its height in inches. At a requested size, long legends are cut."""
+    """Draw one legend below all panels and return its height in inches; at a requested size, half of it at most."""
     width, asked = figure.get_figwidth(), page.current()
-    most = LEGEND_SHARE * (asked.height or (page.TALLEST if asked.width else np.inf))
+    most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 2
     size = mpl.rcParams["legend.fontsize"]
-    kept = [Key(_broken(figure, k.label, 0.8 * width, size), k.colour, k.line, k.marker) for k in keys]
+    kept = [replace(key, label=_broken(figure, key.label, 0.8 * width, size)) for key in keys]
     while True:
         rest = len(keys) - len(kept)
         handles = [_handle(key) for key in kept]
@@ -343,9 +312,8 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
             if extent.width <= width * figure.dpi or columns == 1:
                 break
             legend.remove()
-        used = float(extent.height / figure.dpi)
-        if used <= most or len(kept) <= 1:
-            return used
+        if _height(figure, legend) <= most or len(kept) <= 1:
+            return _height(figure, legend)
         legend.remove()
         kept = kept[: len(kept) // 2]
 
@@ -388,7 +356,7 @@ def _thin(figure: Drawn, axis: Any, name: str) -> bool:
     }
     boxes = [text.get_window_extent(renderer) for text in texts.values()]
     ends = [(box.x0, box.x1) if name == "x" else (box.y0, box.y1) for box in boxes]
-    gap = GAP / 72 * figure.dpi if name == "x" else 0.0
+    gap = 3 / 72 * figure.dpi if name == "x" else 0.0  # 3 points
     step = 1
     while len(ends[::step]) > 2 and any(
         one[1] + gap > two[0] for one, two in zip(sorted(ends[::step])[:-1], sorted(ends[::step])[1:], strict=True)
