@@ -18,10 +18,8 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF, conditions
 
-#: Numbers of samples of the posterior for the band of predictions, and of bins of a density.
-SAMPLES, BINS = 400, 60
-#: Weights of the moving average that smooths a density.
-SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
+#: Number of samples of the posterior for the band of predictions.
+SAMPLES = 400
 Points = NDArray[np.intp]
 
 
@@ -142,18 +140,15 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
     known = name in found.unknowns
     log = bool(np.all(shown > 0)) and (not known or found.prediction.scales[found.unknowns.index(name)].logarithmic)
     across = np.log(shown) if log else shown
-    ends = identifiability.quantiles(across, weights, [1e-4, 1 - 1e-4])
-    if known and is_free:
-        ends = np.array([across.min(), across.max()])
-    margin = 1e-9 * np.abs(ends).max()
-    edges = np.linspace(ends[0] - margin, ends[1] + margin, BINS + 1)
     if known:
-        place = found.posterior.places[:, found.unknowns.index(name)]
-        edges = of_whole_cells(ends, across, place, found.posterior.width)
-    density = np.histogram(across, edges, weights=weights)[0]
-    centres = (edges[1:] + edges[:-1]) / 2
-    smooth = np.convolve(np.pad(density, 2, mode="edge"), SMOOTH, mode="valid")
-    height, back = smooth / smooth.max(), np.exp if log else np.asarray
+        _, first, cell = np.unique(
+            found.posterior.places[:, found.unknowns.index(name)], return_index=True, return_inverse=True
+        )
+        centres, density = across[first], np.bincount(cell, weights)
+    else:
+        density, edges = np.histogram(across, np.histogram_bin_edges(across, "rice"), weights=weights)
+        centres = (edges[1:] + edges[:-1]) / 2
+    height, back = density / density.max(), np.exp if log else np.asarray
     colour = "#909090" if is_free else colours.colour(1)
     x = Axis(labels.with_unit(how.symbol, how.unit), log)
     panel = Panel(x, Axis("probability density", ticks=[(0.0, "0")], low=0.0, high=1.1))
@@ -170,17 +165,6 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
     low, middle, high = back(identifiability.quantiles(across, weights, [0.025, 0.5, 0.975]))
     panel.title = f"{middle:.3g} ({low:.3g}, {high:.3g}) {labels.printed_unit(how.unit)}".strip()
     return panel
-
-
-def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins with equal numbers of cells of the posterior; unequal numbers would give false peaks."""
-    low, high = int(place.argmin()), int(place.argmax())
-    cell = width * (across[high] - across[low]) / (place[high] - place[low])
-    start = across[low] - cell / 2
-    first, last = np.floor((ends[0] - start) / cell), np.ceil((ends[1] - start) / cell)
-    cells = max(1, int(np.ceil((last - first) / BINS)))
-    edges: FloatArray = start + cell * np.arange(first, max(last, first + cells) + 1, cells)
-    return edges
 
 
 PLOTS = (

@@ -15,9 +15,6 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots import colours, labels, page
 from mdr_dask.plots.figure import Bar, Key, Mean
 
-#: Largest number of parameters in a title; the table beside the figure lists all of them.
-MOST_FIXED = 8
-
 
 class Curve(NamedTuple):
     """The data of one curve, with its label, colour, line and marker."""
@@ -116,12 +113,13 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
     ]
 
 
-def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
+def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str = "", first: int = 0) -> Family:
     """Split a series into curves against the parameter `along`.
 
     The curves differ in the parameter `by`. Without `by`, all curves are drawn if there are enough colours; otherwise
     colours show one axis and line styles show a second axis with few values. All other axes are fixed at their middle
-    value. More numbers than colours get a colour bar; of more words than colours, some are left out.
+    value. More numbers than colours get a colour bar; of more words than colours, some are left out. `series` precedes
+    the names of the curves, and `first` is the number of the first colour.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
@@ -144,10 +142,9 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
             left_out += more
     together = parameters_along(data, over) if over else [along]
     joined = over is not None and len(together) == 1 and data.sizes[over] > 1
-    curves, keys, bar = _split(data, kept, joined)
-    return Family(
-        curves, keys, bar, scalars(data), left_out, tuple(name for name in together if name not in (along, by))
-    )
+    curves, keys, bar = _split(data, kept, joined, series, first)
+    varying = tuple(name for name in together if name not in (along, by))
+    return Family(curves, keys, bar, scalars(data), left_out, varying)
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
@@ -175,13 +172,15 @@ def _is_numeric(data: xr.Dataset, dim: str) -> bool:
     return name in data.coords and data[name].dtype.kind in "fiu"
 
 
-def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve], list[Key], Bar | None]:
+def _split(
+    data: xr.Dataset, dims: list[str], joined: bool, series: str, start: int
+) -> tuple[list[Curve], list[Key], Bar | None]:
     """Return one curve for each combination of values of some axes, the entries of the legend, and the colour bar."""
     cells = list(np.ndindex(*(data.sizes[dim] for dim in dims)))
     parts = [needed(data.isel(dict(zip(dims, cell, strict=True)))) for cell in cells]
-    named = [", ".join(_names(part, dims)) for part in parts]
+    named = [", ".join(([series] if series else []) + _names(part, dims)) for part in parts]
     if len(cells) <= colours.most():
-        looks = [(colours.colour(k), *colours.line_and_marker(k)) for k in range(len(cells))]
+        looks = [(colours.colour(k), *colours.line_and_marker(k)) for k in range(start, start + len(cells))]
         curves = [
             Curve(part, label, colour, line if joined else "", marker)
             for part, label, (colour, line, marker) in zip(parts, named, looks, strict=True)
@@ -262,7 +261,7 @@ def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
     names += [name for name in page.current().symbols if name in held and name not in names and _is_known(held[name])]
-    return ", ".join(labels.named(name, held[name]) for name in names[: max(MOST_FIXED, len(axes))])
+    return ", ".join(labels.named(name, held[name]) for name in names)
 
 
 def _is_known(value: xr.DataArray) -> bool:

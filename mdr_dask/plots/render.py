@@ -202,7 +202,8 @@ def _dots(axes: Axes, trace: Trace, panel: Panel) -> None:
     if "y_low" in trace.data:
         lengths = _lengths(y, trace.column("y_low"), trace.column("y_high"))
         axes.errorbar(x, y, lengths, fmt="none", ecolor="0.7", elinewidth=0.8, capsize=2)
-    how, norm = colours.scale(panel.bar or colours.bar("", value))
+    assert panel.bar is not None
+    how, norm = colours.scale(panel.bar)
     known = np.isfinite(value) & np.isfinite(y)
     axes.scatter(x[known], y[known], c=value[known], s=16, cmap=how, norm=norm, zorder=3, gid=trace.kind)
 
@@ -212,7 +213,8 @@ def _map(axes: Axes, trace: Trace, panel: Panel) -> None:
     columns, rows = np.unique(x), np.unique(y)
     cells = np.full((rows.size, columns.size), np.nan)
     cells[np.searchsorted(rows, y), np.searchsorted(columns, x)] = value
-    how, norm = colours.scale(panel.bar or colours.bar("", value))
+    assert panel.bar is not None
+    how, norm = colours.scale(panel.bar)
     ends = edges(columns, panel.x.log), edges(rows, panel.y.log)
     axes.pcolormesh(*ends, cells, cmap=how, norm=norm, rasterized=True, gid=trace.kind)
 
@@ -297,9 +299,9 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels and return its height in inches; at a requested size, half of it at most."""
+    """Draw one legend below all panels and return its height in inches; at a requested size, a third of it at most."""
     width, asked = figure.get_figwidth(), page.current()
-    most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 2
+    most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 3
     size = mpl.rcParams["legend.fontsize"]
     kept = [replace(key, label=_broken(figure, key.label, 0.8 * width, size)) for key in keys]
     while True:

@@ -22,8 +22,8 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
 #: Largest numbers of panels for one output, and of characters in one line of the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: Main effects: least number of cases in a bin; largest numbers of bins, of parameters, and of cases drawn as points.
-IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
+#: Largest numbers of parameters, and of cases drawn as points, in a figure of main effects.
+MOST_EFFECTS, MOST_POINTS = 12, 5000
 #: Marks for cases without a value, and for cases whose mean may be biased because some realisations failed.
 MARKS = {
     Status.FAILED: ("x", "failed"),
@@ -224,7 +224,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     along = view.along[0]
     parts, left_out = _parts(found, view, output)
     x = _axis(along, [data[along] for data in found.values()], view, "x")
-    families = [{name: curves.family(data, output, along, view.by) for name, data in p.series.items()} for p in parts]
+    families = [_families(part.series, view, output) for part in parts]
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
     log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
@@ -304,18 +304,20 @@ def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]
 
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
     """Draw the curves of all series of a panel and their laws, and mark the cases without a value."""
-    panel = Panel(x, Axis(""), title=part.title)
+    panel = Panel(x, Axis(""), title=part.title, bar=next(iter(families.values())).bar)
     along, law_name = view.along[0], ""
     marked: dict[str, str] = {}
-    several_styles = any(one.bar or len({curve.line for curve in one.curves}) > 1 for one in families.values())
-    for curve, one in _coloured(families):
+    every = [curve for one in families.values() for curve in one.curves]
+    several_styles = panel.bar or len({curve.line for curve in every}) > 1
+    for curve in every:
         data = _counted(curve.data, output)
         place, value = _places(data, along), curves.mean(data, output)
         shades = data[view.by] if view.by in data.coords and data[view.by].ndim else None
         if shades is not None and shades.dtype.kind in "fiu":
-            shown = labels.shown(view.by, shades)
-            panel.bar = colours.bar(labels.label(view.by, shades), shown)
-            panel.traces.append(Trace("dots", columns(data, x=place, y=value, value=shown), label=curve.label))
+            points = columns(data, x=place, y=value, value=labels.shown(view.by, shades))
+            panel.traces.append(Trace("dots", points, label=curve.label))
+            dots = [trace.column("value") for trace in panel.traces if trace.kind == "dots"]
+            panel.bar = colours.bar(labels.label(view.by, shades), np.concatenate(dots))
         else:
             points = columns(data, x=place, y=value)
             look = {"colour": curve.colour, "line": curve.line, "marker": curve.marker}
@@ -324,8 +326,7 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
         if curve.line and not several_styles and (law := laws.law_of(data, output)):
             panel.traces.append(_law(curve, law, along, output))
             law_name = law.name
-        panel.bar = panel.bar or one.bar
-    panel.keys = _keys(families)
+    panel.keys = [key for one in families.values() for key in one.keys]
     if law_name:
         panel.keys.append(Key(law_name, "#000000", "--"))
     panel.keys += [Key(name, "#404040", "", mark) for name, mark in marked.items()]
@@ -335,29 +336,19 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
     return panel
 
 
-def _coloured(families: Mapping[str, curves.Family]) -> list[tuple[curves.Curve, curves.Family]]:
-    """Return the curves of a panel, each with its family. If several series share the panel, curves get new colours."""
-    every = [(name, curve, one) for name, one in families.items() for curve in one.curves]
-    if len(families) == 1:
-        return [(curve, one) for _, curve, one in every]
-    if len(every) > colours.most():
+def _families(series: Mapping[str, xr.Dataset], view: View, output: str) -> dict[str, curves.Family]:
+    """Return the curves of all series of a panel, in different colours."""
+    found: dict[str, curves.Family] = {}
+    first = 0
+    for name, data in series.items():
+        found[name] = curves.family(data, output, view.along[0], view.by, name if len(series) > 1 else "", first)
+        first += len(found[name].curves)
+    if len(series) > 1 and first > colours.most():
         raise DataError(
-            f"expected at most {colours.most()} curves of several series in a panel, got {len(every)}: "
+            f"expected at most {colours.most()} curves of several series in a panel, got {first}: "
             "--select fewer, or leave --panels out"
         )
-    markers = dict(zip(families, colours.MARKERS * len(families), strict=False))
-    found = []
-    for k, (name, curve, one) in enumerate(every):
-        label = ", ".join(part for part in (name, curve.label) if part)
-        line = colours.line_and_marker(k)[0] if curve.line else ""
-        found.append((curves.Curve(curve.data, label, colours.colour(k), line, markers[name]), one))
     return found
-
-
-def _keys(families: Mapping[str, curves.Family]) -> list[Key]:
-    if len(families) == 1:
-        return list(next(iter(families.values())).keys)
-    return [Key(c.label, c.colour, c.line, c.marker) for c, _ in _coloured(families) if c.label]
 
 
 def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
@@ -423,11 +414,11 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
         points = columns(data, value=Mean(*(xr.broadcast(part, x, y)[0] for part in value)), x=x, y=y)
         trace = Trace("dots" if x.dims == y.dims else "map", points)
         across, up = (_axis(name, [data[name]], view, which) for name, which in zip(view.along, "xy", strict=True))
-        panels.append(Panel(across, up, [trace], title, bar, _crossed_out(trace)))
-        if panels[-1].keys:
-            at = ~np.isfinite(trace.column("value"))
+        panels.append(Panel(across, up, [trace], title, bar))
+        if (at := ~np.isfinite(trace.column("value"))).any():
             missing = columns(x=trace.column("x")[at], y=trace.column("y")[at])
             panels[-1].traces.append(Trace("curve", missing, "no value", "no value", "#606060", "", "x"))
+            panels[-1].keys = [Key("no value", "#606060", "", "x")]
     figure = Figure(panels, "", share_y=len(panels) > 1)
     figure.fixed = curves.fixed_text(curves.fixed_by_all([curves.scalars(data) for _, data, _ in drawn]), drawn[0][1])
     half = np.concatenate([np.ravel(value.high - value.low) / 2 for _, _, value in drawn])
@@ -436,10 +427,6 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
         figure.bars = f"95 % intervals: at most ±{np.nanmax(half):.2g} {unit}".rstrip()
     figure.leave_out(left_out)
     return figure
-
-
-def _crossed_out(trace: Trace) -> list[Key]:
-    return [] if np.isfinite(trace.column("value")).all() else [Key("no value", "#606060", "", "x")]
 
 
 # main effects
@@ -487,12 +474,11 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Sort the cases of a sampled study by one parameter, divide them into groups, and return the group means."""
+    """Sort n cases of a sampled study by one parameter, divide them into sqrt(n) groups, and return the group means."""
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
     order = np.argsort(cases[name].values, kind="stable")
-    count = int(np.clip(cases.size // IN_A_BIN, 1, MOST_BINS))
-    groups = [cases.isel({dim: part}) for part in np.array_split(order, count)]
+    groups = [cases.isel({dim: part}) for part in np.array_split(order, int(np.sqrt(cases.size)))]
     across = [float(_places(group.to_dataset(name=output), name).mean()) for group in groups]
     means = [
         aggregation.mean_and_ends(group.rename({dim: "realisation"}).reset_coords(drop=True), None) for group in groups

@@ -77,18 +77,10 @@ def _axis(axis: Axis) -> Json:
 
 def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> Json:
     """Return one curve, law or map as data: every `step`-th point, in the order in which a curve joins the points."""
-    columns = {str(name): trace.column(str(name)) for name in trace.data.data_vars}
-    x, drawn = columns["x"], columns.get("value", columns.get("y", columns["x"]))
-    order = np.argsort(x, kind="stable") if trace.kind == "curve" and trace.line else np.arange(x.size)
-    gaps = x[np.isfinite(x) & ~np.isfinite(drawn)] if trace.line else x[:0]
-    order = order[np.isfinite(drawn[order])]
-    kept = np.unique([*range(0, order.size, step), max(order.size - 1, 0)])[: order.size] if step > 1 else slice(None)
-    order = order[kept]
-    widest = trace.data[max(trace.data.data_vars, key=lambda name: trace.data[name].ndim)]
-    parameters = {
-        str(name): coord.broadcast_like(widest).transpose(*widest.dims).to_numpy().ravel()[order]
-        for name, coord in trace.data.coords.items()
-    }
+    rows = trace.frame()
+    if trace.kind == "curve" and trace.line:
+        rows = rows.sort_values("x", kind="stable")
+    rows = rows.iloc[np.unique([*range(0, len(rows), step), len(rows) - 1])] if len(rows) else rows
     found: Json = {
         "panel": panel,
         "kind": trace.kind,
@@ -98,17 +90,16 @@ def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> J
         "colour": trace.colour,
         "line": trace.line,
         "marker": trace.marker,
-        **{name: numbers(columns[name][order]) for name in LAST if name in columns},
-        "of": {name: _once(numbers(values)) for name, values in parameters.items()},
+        **{name: numbers(rows[name].to_numpy()) for name in LAST if name in rows},
+        "of": {str(name): _once(numbers(rows[name].to_numpy())) for name in trace.data.coords},
     }
-    if trace.kind in ("dots", "map"):
-        bar = of.bar or colours.bar("", drawn)
-        found |= {"scale": bars.index(bar)} if bar in bars else {"shades": _shades(bar)}
+    if of.bar and trace.kind in ("dots", "map"):
+        found["scale"] = bars.index(of.bar)
     if trace.kind == "map":
         for name, axis in (("x", of.x), ("y", of.y)):
-            found[f"{name}_edges"] = numbers(edges(np.unique(columns[name]), axis.log))
-    if gaps.size:
-        found["gaps"] = numbers(gaps)
+            found[f"{name}_edges"] = numbers(edges(np.unique(trace.column(name)), axis.log))
+    if trace.line and "y" in trace.data:
+        found["gaps"] = numbers(trace.column("x")[~np.isfinite(trace.column("y"))])
     return found
 
 

@@ -77,14 +77,6 @@ def test_a_figure_of_a_requested_width_fits_on_a_page(size, count, stack, ratio)
     assert min(box.height for box in sizes) / figure.dpi > 0.4
 
 
-def test_a_title_is_not_cut_within_a_sentence():
-    description = draw({"": study(3)}, View("mu", "velocity"))
-    description.warnings = [f"warning number {k} with {'many words ' * 12}at the end" for k in range(5)]
-    title = render(description).get_suptitle().replace("\n", " ")
-    assert title.count("warning number") == title.count("at the end") > 0
-    assert title.endswith("more: see the table beside the figure")
-
-
 def test_a_title_can_be_set_and_switched_off():
     for title, size, shown in (("Mine", "85mm", "Mine"), ("", "", ""), (None, "85mm", "")):
         with page.drawing_for(page.requested(size, title)):

@@ -86,15 +86,15 @@
       return state.errors ? [area(trace, kept, report.legible(trace.colour, palette))] : [];
     },
     dots(trace, spec, state, palette, kept) {
-      const scale = spec.scales[trace.scale] || trace.shades;
+      const scale = spec.scales[trace.scale];
       const number = (value) => (scale.log ? Math.log10(value) : value);
       const bars = state.errors && trace.y_low && lengths(trace, "y", kept);
       return [{ type: "scatter", mode: "markers", x: kept.map((k) => trace.x[k]), y: kept.map((k) => trace.y[k]), text: kept.map((k) => report.pointText(trace, spec, k)),
         hoverinfo: "text", ...(bars ? { error_y: { ...bars, color: palette.line } } : {}),
-        marker: { size: 7, color: kept.map((k) => number(trace.value[k])), ...coloured(scale, palette, trace.scale !== undefined), line: { width: 0.5, color: palette.line } } }];
+        marker: { size: 7, color: kept.map((k) => number(trace.value[k])), ...coloured(scale, palette), line: { width: 0.5, color: palette.line } } }];
     },
     map(trace, spec, state, palette, kept) {
-      const scale = spec.scales[trace.scale] || trace.shades;
+      const scale = spec.scales[trace.scale];
       const [columns, rows] = [trace.x, trace.y].map((values) => [...new Set(values)].sort((one, other) => one - other));
       const blank = () => rows.map(() => columns.map(() => null));
       const [z, text] = [blank(), blank()];
@@ -103,7 +103,7 @@
         z[row][column] = scale.log ? Math.log10(trace.value[k]) : trace.value[k];
         text[row][column] = report.pointText(trace, spec, k);
       }
-      const { colorscale, cmin, cmax, colorbar, showscale } = coloured(scale, palette, trace.scale !== undefined);
+      const { colorscale, cmin, cmax, colorbar, showscale } = coloured(scale, palette);
       return [{ type: "heatmap", x: trace.x_edges, y: trace.y_edges, z, text, hoverinfo: "text", colorscale, zmin: cmin, zmax: cmax, colorbar, showscale, hoverongaps: false }];
     },
     absent(trace, spec, state, palette, kept) {
@@ -113,7 +113,7 @@
     },
   };
 
-  const coloured = (scale, palette, shown) => {
+  const coloured = (scale, palette) => {
     const number = (value) => (scale.log ? Math.log10(value) : value);
     const colorscale = scale.colours.map((colour, k) => [k / (scale.colours.length - 1), colour]);
     const [cmin, cmax] = [number(scale.low), number(scale.high)];
@@ -125,7 +125,7 @@
       const inside = ticks.filter((tick) => tick >= 0.999 * scale.low && tick <= 1.001 * scale.high);
       Object.assign(bar, { tickvals: inside.map(Math.log10), ticktext: inside.map(report.number) });
     }
-    return { colorscale, cmin, cmax, colorbar: bar, showscale: shown };
+    return { colorscale, cmin, cmax, colorbar: bar, showscale: true };
   };
 
   const axis = (how, log, palette) => ({
@@ -148,7 +148,7 @@
     spec.scales.forEach((scale, k) => {
       const own = spec.traces.some((trace) => trace.scale === k);
       if (!own && scale.panels.at(-1) === number)
-        data.push({ type: "scatter", mode: "markers", x: [null], y: [null], hoverinfo: "skip", marker: { color: [number], ...coloured(scale, palette, true) } });
+        data.push({ type: "scatter", mode: "markers", x: [null], y: [null], hoverinfo: "skip", marker: { color: [number], ...coloured(scale, palette) } });
     });
     const [x, y] = ["x", "y"].map((name) => axis(panel[name], state.log[name] ?? panel[name].log, palette));
     const layout = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: palette.ink, family: "system-ui, sans-serif", size: 12 },
