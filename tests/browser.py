@@ -25,13 +25,8 @@ class Browser:
 
     def __init__(self):
         self.profile = tempfile.mkdtemp(prefix="chromium-")
-        options = [
-            "--headless=new",
-            "--disable-gpu",
-            "--no-first-run",
-            "--remote-debugging-port=0",
-            "--disable-extensions",
-        ]
+        options = ["--headless=new", "--disable-gpu", "--no-first-run", "--remote-debugging-port=0"]
+        options += ["--disable-extensions"]
         options += ["--disable-background-networking", "--disable-component-update", f"--user-data-dir={self.profile}"]
         options += ["--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"]
         if os.geteuid() == 0:

@@ -141,9 +141,7 @@ def test_a_study_in_a_bucket_is_run_grown_verified_and_mended_like_one_on_a_disk
     assert chunks(bucket) == chunks(url)
 
 
-def test_a_network_that_is_gone_ends_a_run_in_one_sentence_and_the_next_one_goes_on(
-    toy, link, bucket, url, monkeypatch
-):
+def test_a_run_ends_with_the_network_and_the_next_one_goes_on(toy, link, bucket, url, monkeypatch):
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")  # those of the library below take more than a minute
     run(small(toy, 9), url)
     port, begun = link.target, []

@@ -107,14 +107,8 @@ def test_aggregates_are_brief_for_a_reader_and_complete_for_a_program(study, cap
 
 def test_labelled_arrays_carry_units_numbers_and_states(study, tmp_path, capsys):
     path = tmp_path / "answer.nc"
-    arguments = [
-        "--columns",
-        "load_number,friction_coefficient",
-        "--units",
-        "velocity=km/h",
-        "--where",
-        "velocity > 5 mm/s",
-    ]
+    arguments = ["--columns", "load_number,friction_coefficient", "--units", "velocity=km/h"]
+    arguments += ["--where", "velocity > 5 mm/s"]
     assert "variables over" in output(capsys, "show", study, *arguments, "-o", str(path)).out
     with xr.open_dataset(path) as found:
         assert found.velocity.attrs["units"] == "km/h"

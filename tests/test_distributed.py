@@ -93,9 +93,7 @@ def test_a_cluster_that_cannot_be_started_is_named(toy, url, name):
 
 
 @pytest.mark.slow
-def test_a_worker_that_does_not_see_the_store_is_told_apart_and_relative_paths_are_seen(
-    toy, tmp_path, workers, monkeypatch
-):
+def test_workers_see_relative_paths_and_name_a_store_that_they_do_not_see(toy, tmp_path, workers, monkeypatch):
     """A path by way of this process's own files is another one to a worker."""
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
     (tmp_path / "here").mkdir()

@@ -73,9 +73,7 @@ def test_blocks_hold_no_more_than_the_work_aimed_at_unless_one_result_does(toy, 
 
 @settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=20)
 @given(positions=st.integers(1, 300), realisations=st.integers(1, 300))
-def test_without_a_count_of_operations_there_are_as_many_blocks_as_results_in_a_block(
-    toy, costs, positions, realisations
-):
+def test_without_costs_there_are_as_many_blocks_as_results_in_a_block(toy, costs, positions, realisations):
     costs(1.0, operations=None)
     campaign = study(toy, (positions, 1), realisations)
     (template,) = plan.templates(campaign, realisations)

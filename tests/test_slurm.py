@@ -58,15 +58,8 @@ def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_
     slurm.environment["PAUSE"] = "5"  # eight of them: longer than SLURM may take to see that the signal is due
     ends = []
     while ends[-1:] != [{"COMPLETED"}] and len(ends) < 12:
-        options = [
-            "--array=1-3",
-            "--cpus-per-task=1",
-            "--time=1",
-            "--signal=B:TERM@45",
-            "--output=%a.txt",
-            "--open-mode=append",
-        ]
-        ends.append(slurm.wait(slurm.submit(*options, "parts.sh", "long.yaml")))
+        options = "--array=1-3 --cpus-per-task=1 --time=1 --signal=B:TERM@45 --output=%a.txt --open-mode=append"
+        ends.append(slurm.wait(slurm.submit(*options.split(), "parts.sh", "long.yaml")))
     printed = "".join(path.read_text() for path in folder.glob("*.txt"))
     assert missing("long.zarr") == 0, printed
     assert len(ends) > 1, printed

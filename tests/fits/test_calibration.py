@@ -171,16 +171,8 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
         (RIG.replace("1, 0.1,", "1, 30,"), {}, r"rig.csv:3: velocity is 30 m/s, but this study has 0.001 m/s to 1 m/s"),
         (RIG, {"relaxation_time": slice(3)}, "expected at least 4 values of the unknown relaxation_time, got 3"),
         (RIG, {"velocity": slice(3)}, "but this study has"),
-        (
-            RIG,
-            {"relaxation_time": 0, "rms_roughness": 0},
-            "expected one to 4 axes of the study that are not columns of the table, got none",
-        ),
-        (
-            RIG.replace(", standard_error", "").replace(", 0.001", ""),
-            {},
-            "expected more than 2 measured points for 2 unknowns",
-        ),
+        (RIG, {"relaxation_time": 0, "rms_roughness": 0}, "expected one to 4 axes of the study .*, got none"),
+        (RIG.replace(", standard_error", "").replace(", 0.001", ""), {}, "expected more than 2 measured points for 2"),
     ],
 )
 def test_bad_input_is_refused_with_its_reason(text, change, message):

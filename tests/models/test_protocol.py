@@ -32,9 +32,7 @@ def test_one_step_is_the_jump() -> None:
 @pytest.mark.parametrize(
     "material", [None, {"standard_solid": {"static_modulus": 1e7, "glass_modulus": 3e7, "relaxation_time": 3e-4}}]
 )
-def test_every_history_ends_in_its_steady_state(
-    protocol: dict[str, object], material: dict[str, object] | None
-) -> None:
+def test_every_history_ends_in_its_steady_state(protocol, material) -> None:
     kelvin = {} if material is None else {"shear_modulus": None, "relaxation_time": None, "material": material}
     found = compute(block(protocol=protocol, relaxation_times=(1.0, 60.0), **kelvin)).values
     assert np.allclose(found["friction_coefficient"][..., -1], found["friction_coefficient_after"], rtol=0.01)
@@ -145,9 +143,7 @@ def load_step(shape: str, start: str, tmp_path: Path) -> dict[str, object]:
     ("shape", "start", "glass"),
     [("steps", "rest", None), ("late", "steady", 3.0), ("table", "steady", None), ("two rows", "rest", 3.0)],
 )
-def test_a_load_step_at_the_beginning_starts_from_the_load_before_it(
-    shape: str, start: str, glass: float | None, tmp_path: Path
-) -> None:
+def test_a_load_step_at_the_beginning_starts_from_the_load_before_it(shape, start, glass, tmp_path: Path) -> None:
     """In full contact the depth creeps by the compliance J(t), and mu = 4 eta v L s^2 / F_N under each load."""
     body, recovery, instant = {}, 1.0, 0.0  # J(t) = 1 - (1 - instant) exp(-t / recovery)
     if glass is not None:

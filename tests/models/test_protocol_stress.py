@@ -70,9 +70,7 @@ def of(body: str) -> dict[str, object]:
 
 @settings(max_examples=12, deadline=None)
 @given(frequency=powers(0, 5), part=shares(3), load=shares(0.999), force=powers(-5, 2))
-def test_oscillation_slower_and_faster_than_relaxation(
-    frequency: float, part: float, load: float, force: float
-) -> None:
+def test_slow_and_fast_oscillation(frequency: float, part: float, load: float, force: float) -> None:
     swing = {"shape": "oscillation", "amplitude": 0.05 * part, "frequency": frequency, "force_amplitude": force * load}
     check(protocol=swing, normal_force=force)
 
