@@ -70,11 +70,7 @@ def test_a_changed_function_with_the_same_version_is_noticed(example, caplog):
     ("name", "module", "sentence"),
     [
         ("absent_module:MODEL", None, "cannot import 'absent_module' .* put its folder on PYTHONPATH"),
-        (
-            "wear_rate:NOTHING",
-            MODULE,
-            "cannot load model 'wear_rate:NOTHING': module 'wear_rate' has no attribute 'NOTHING'",
-        ),
+        ("wear_rate:NOTHING", MODULE, "'wear_rate:NOTHING': module 'wear_rate' has no attribute 'NOTHING'"),
         ("wear_rate:solve", MODULE, "expected 'wear_rate:solve' to be an mdr_dask.models.base.Model, got function"),
         ("wear_rate:MODEL", "1 / 0", "ZeroDivisionError: division by zero"),
         ("wear_rate", MODULE, "unknown model 'wear_rate'"),

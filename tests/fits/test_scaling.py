@@ -88,9 +88,8 @@ def test_laws_that_predict_the_same_for_all_cases_are_not_tested():
     found = FIT["contact_slope"].compute({"": planted(CURVES, 10, 1, **whole)})
     assert np.all(found["law_holds"].str.startswith("not tested: the lengths in contact"))
     near = {"normal_force": np.linspace(1e-2, 1.02e-2, 4)}
-    found = FIT["contact_growth"].compute(
-        {"": planted(near, 10, 1, contact_fraction=lambda force, _: 0.3 * force**0.6)}
-    )
+    data = planted(near, 10, 1, contact_fraction=lambda force, _: 0.3 * force**0.6)
+    found = FIT["contact_growth"].compute({"": data})
     assert np.isnan(found["exponent"]).all()
     assert np.all(found["law_holds"].str.startswith("not tested: the cases differ too little"))
     assert np.all(found["fitted_law_holds"].str.startswith("not tested: these cases do not determine"))

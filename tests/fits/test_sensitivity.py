@@ -97,10 +97,7 @@ def test_too_few_points_are_reported_with_the_number_needed():
         (lambda d: d.assign(y=0 * d.y), "the same in every case"),
         (lambda d: d.rename(case="x"), "got a grid"),
         (lambda d: d.assign(y=d.y.expand_dims(time=3)), "got values along the dimension time"),
-        (
-            lambda d: d.assign_coords(x1=("case", np.full(d.sizes["case"], "a"))),
-            "expected numbers for the input x1, got words",
-        ),
+        (lambda d: d.assign_coords(x1=("case", np.full(d.sizes["case"], "a"))), "expected numbers for the input x1"),
     ],
 )
 def test_bad_studies_are_refused_with_the_reason(change, what):

@@ -167,10 +167,7 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        (
-            STEEL.replace("1 um", "100 um"),
-            "the amplitude is in gross slip: it must stay below mu E* d0 / G*, got 59.32",
-        ),
+        (STEEL.replace("1 um", "100 um"), "the amplitude is in gross slip: it must stay below mu E* d0 / G*"),
         (TABLE, "the contact reaches beyond the table"),
     ],
 )

@@ -125,11 +125,7 @@ def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
         (joined(np.c_[Y, ROWS]), Units("um"), "does not state the unit of its positions: give `x_unit`"),
         (joined(np.c_[Y**1.5, ROWS]), UNITS, "expected positions on a regular grid"),
         ("Unit: nm\n" + joined(ROWS), UNITS, "the file states nm, got 'um': leave out `unit`"),
-        (
-            "pixel size,2 um\n" + joined(ROWS, ","),
-            UNITS,
-            "the spacing is 2 um in its heading and 2.5 um in `spacing`: leave out",
-        ),
+        ("pixel size,2 um\n" + joined(ROWS, ","), UNITS, "2 um in its heading and 2.5 um in `spacing`: leave out"),
         ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("um"), "the file states nm, got 'um': leave out `unit`"),
         (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name the columns"),
         ("", UNITS, "expected the same number of heights in every row"),
