@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from test_extremes import ROLLERS
 
 from mdr_dask.campaign import load
 from mdr_dask.errors import CampaignError, DataError
+from mdr_dask.models import load as model_named
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.surface import Surface, lines_of, spectra_of
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
@@ -129,17 +131,9 @@ def test_a_line_too_short_for_the_spectrum_is_a_status(tmp_path):
 
 def test_two_rollers_have_spectra_of_their_own(tmp_path):
     """Spectra equal to the generated lines give their film ratio and contact; a rougher one lowers the film ratio."""
-    from mdr_dask.models import load as model_named
-
     model = model_named("mixed_lubrication")
-    roller = {
-        "points": 40_000,
-        "roller_radius": 1e-3,
-        "roller_width": 0.01,
-        "normal_force": 100.0,
-        "cutoff_force": 100.0,
-    }
-    roller |= {"rotation_speed": 10.0, "temperature": 333.15, "film_thickness": 4e-7}
+    roller = ROLLERS | {"points": 40_000, "roller_width": 0.01, "film_thickness": 4e-7}
+    del roller["rms_roughness"]
     names = ("film_ratio", "contact_length", "asperity_load_share")
 
     def values(**more):

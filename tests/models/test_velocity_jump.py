@@ -1,6 +1,7 @@
 """The model velocity_jump: values, shared solutions, errors and failed cases."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,22 +12,13 @@ from pydantic import ValidationError
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.sliding_friction import SlidingFriction
 from mdr_dask.models.sliding_friction import solve as sliding
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.velocity_jump import MODEL
 from mdr_dask.models.velocity_jump.solve import compute, distinct
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.transients import accuracy as jumps
 
 LINE = BASE | {"points": 400, "relaxation_times": (0.01, 0.1, 1.0, 10.0)}
-
-
-def parameters(**changes: object) -> VelocityJump:
-    return block(**LINE | changes).parameters
-
-
-def of_line(
-    columns: dict[str, np.ndarray], realisations: tuple[int, ...] = (0, 3), **changes: object
-) -> Block[VelocityJump]:
-    return block(columns, realisations, **LINE | changes)
+of_line = partial(block, **LINE)
 
 
 def test_a_transient_that_misses_the_accuracy_has_a_warning() -> None:
@@ -126,7 +118,7 @@ def test_impossible_jumps_are_failed_cases_with_a_message_in_every_realisation(n
 )
 def test_impossible_parameters_are_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
-        parameters(**change)
+        of_line(**change)
 
 
 def test_depth_of_a_jump_comes_from_the_march() -> None:
@@ -171,7 +163,7 @@ ENDS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_co
 @pytest.mark.parametrize("seed", range(0, 60, 15))
 def test_ends_are_the_steady_solvers(seed: int) -> None:
     case = random_jump(seed)
-    found = compute(Block(parameters(**case), {}, 1, (seed,), 5, MODEL.with_companions(ENDS), 0.01)).values
+    found = compute(Block(of_line(**case).parameters, {}, 1, (seed,), 5, MODEL.with_companions(ENDS), 0.01)).values
     for name, change in (("before", 0.0), ("after", case["velocity_change"])):
         truth = compute_friction(1e-5, (seed,), **case | {"velocity": case["velocity"] * (1 + change)})
         exact = truth.values["friction_coefficient"][0, 0]
@@ -181,8 +173,8 @@ def test_ends_are_the_steady_solvers(seed: int) -> None:
 def test_a_small_transient_with_coarse_steps_ends_at_the_steady_friction() -> None:
     """Friction changes by 0.7 % only, and time steps of a quarter of a decade have an error of 0.03 %."""
     scene = {"length": 0.01, "points": 5000, "hurst": 1.0, "rms_roughness": 1e-5, "normal_force": 1.2}
-    few = parameters(**scene, velocity=4.5203536563602, velocity_change=0.2, oversampling=4, steps_per_decade=4)
-    found = compute(Block(few, {}, 1, (128,), 2014, ("friction_coefficient", "friction_coefficient_after")))
+    few = of_line(**scene, velocity=4.5203536563602, velocity_change=0.2, oversampling=4, steps_per_decade=4)
+    found = compute(Block(few.parameters, {}, 1, (128,), 2014, ("friction_coefficient", "friction_coefficient_after")))
     assert found.status[0, 0] == Status.DONE
     after = found.values["friction_coefficient_after"][0, 0]
     assert abs(found.values["friction_coefficient"][0, 0, -1] / after - 1) < 1e-3

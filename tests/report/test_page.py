@@ -15,7 +15,6 @@ from report_stores import HOSTILE, friction, hostile
 from mdr_dask import aggregation, fits, plots, store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
-from mdr_dask.plots.page import with_labels
 from mdr_dask.report import cases, figures, page, read_study, words
 
 #: Numbers of the page have nine digits.
@@ -198,17 +197,3 @@ def test_what_cannot_be_reported_is_refused_and_nothing_is_written(url, argument
     assert main(["report", *(argument.format(url=url) for argument in arguments)]) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_errors_of_a_case_are_in_the_unit_of_its_value(url):
-    """A pressure in GPa, from Pa: mean, both ends of its interval and both errors."""
-    (data,) = store.datasets(url).values()
-    pressure = (1e9 * data["friction_coefficient"]).assign_attrs(units="Pa", ancillary_variables="pressure_error")
-    data = data.assign(pressure=pressure, pressure_error=0.01 * pressure)
-    shape = data["pressure"].isel(realisation=0, drop=True)
-    with with_labels({"pressure": "GPa"}, {}):
-        found = {name: np.array(values) for name, values in cases._measured(data, "pressure", shape).items()}
-    mean, lines = 1e-9 * pressure.mean("realisation"), 1e-9 * aggregation.standard_error(pressure)
-    for name, expected in (("value", mean), ("lines", lines), ("grid", 0.01 * mean)):
-        np.testing.assert_allclose(found[name], expected.to_numpy().ravel(), rtol=1e-6)
-    assert np.all((found["low"] < found["value"]) & (found["value"] < found["high"]))

@@ -106,6 +106,28 @@ def drawn(seed, lines):
         yield random_line(random, points, hurst), deborah, loads
 
 
+def judged(seed, lines, accuracy):
+    """Return errors over estimates and over the accuracy for drag, contact fraction and slope, shape (3, cases)."""
+    ratios, shares = [], []
+    for surface, deborah, loads in drawn(seed, lines):
+        steady, errors = solve_problem(surface, None, deborah, loads, Request(accuracy))
+        exact = truth(surface, deborah, loads).columns
+        off = np.abs(steady.columns - exact)
+        floors = np.array(FLOORS)[:, None]
+        assert np.all(off[1] <= errors[1] + 1e-6)  # the depth converges fastest
+        ratios.append((off / (errors + 1e-6 * np.maximum(exact, floors)))[[0, 2, 3]])
+        met = errors <= 1.0001 * accuracy * np.maximum(np.abs(steady.columns), floors)
+        shares.append(np.where(met, off / np.maximum(np.abs(exact), floors), 0.0)[[0, 2, 3]])
+    return np.hstack(ratios), np.hstack(shares)
+
+
+@pytest.mark.parametrize("accuracy", [0.05, 0.01])
+def test_errors_are_below_their_estimates(accuracy):
+    ratios, shares = judged(7, 15, accuracy)
+    assert np.mean(ratios <= 1) >= 0.93
+    assert np.mean(shares > accuracy) <= 0.02
+
+
 @pytest.mark.parametrize(
     ("seed", "realisation", "points", "hurst", "load", "pace"),
     [

@@ -1,14 +1,16 @@
-"""The contact at an instant, compared with the steady sweep, with an exhaustive search and with every element."""
+"""The contact at an instant, compared with an exhaustive search and with every element."""
 
 import numpy as np
 import pytest
 from references.largest_displacement import judged, marched, searched_afresh
 from schemes import rough_line
 
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients import velocity_jump
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.patches import LOAD
-from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation, jump_between
 
 TIMES = np.geomspace(1e-3, 5, 25)
 EVERY_MOMENT = 1000
@@ -35,6 +37,21 @@ def test_every_moment_carries_the_load(ratio: float) -> None:
             missing.append(abs(work.sums[LOAD] / marching.load - 1))
     assert len(missing) > 100
     assert np.mean(np.array(missing) > 1e-3) < 0.02  # the load is discontinuous where a patch appears or vanishes
+
+
+@pytest.mark.parametrize(
+    ("hurst", "load", "deborah", "ratio"),
+    [(0.7, 1.16, 1.0, 0.4), (0.7, 25.0, 1.0, 5.0), (0.3, 5.4, 1.0, 5.0), (0, 0.0539, 0.147, 5.0)],
+)
+def test_skipped_cells_change_nothing(hurst, load, deborah, ratio, monkeypatch) -> None:
+    line, both = rough(1000, hurst, 4, 2014), np.array([[deborah, ratio * deborah]])
+    limits, request = steady_limits(line, np.array([load]), both)[0], MarchRequest(TIMES, 1000 * np.pi, 6)
+    near = jump_between(line, load, both[0], limits, request)
+    nodes = line.track.height.size
+    monkeypatch.setattr(velocity_jump, "_runs", lambda *_: (np.array([[0, nodes - 1]]), np.full(nodes, -np.inf)))
+    whole = jump_between(line, load, both[0], limits, request)
+    assert near.outcome == whole.outcome == Outcome.CONVERGED
+    assert np.max(np.abs(near.trace - whole.trace)) <= 0.01 * np.max(np.abs(whole.trace - whole.after))
 
 
 @pytest.mark.slow

@@ -89,21 +89,6 @@ def test_estimates_of_histories_hold_before_and_after_the_image_jumps(exponent, 
         assert np.mean(gap <= worn.error("worn_profile", PLACES)) > 0.95
 
 
-@pytest.mark.slow
-def test_radii_of_histories_are_not_known_better_than_half_a_cell():
-    """Two grids agree by chance in the radii."""
-    rng, found = np.random.default_rng(32), []
-    for _ in range(10):
-        n, c = float(np.exp(rng.uniform(-0.2, 1.4))), float(rng.uniform(0.2, 0.9))
-        profile, eta = PowerProfile(n), 1.0 - c**n
-        truth = exact(profile, c, [0.3, 2.0, 8.0], 4e-4, errors=False)
-        blocks = [LoadBlock(cycles, eta, depth=1.0) for cycles in (0.3, 1.7, 6.0)]
-        for cells in (60, 200):
-            for worn, true in zip(history(profile, blocks, cells=cells), truth, strict=True):
-                found.append(held(worn, true, ("stick_border", "contact_radius")))
-    assert np.all(np.mean(found, axis=0) >= 0.95)
-
-
 def test_errors_are_nowhere_beyond_the_scar_and_nan_where_there_is_no_value():
     worn = exact(PowerProfile(2.0), 0.455, [1.0], 1e-3)[0]
     assert np.all(worn.error("worn_profile", PLACES)[PLACES > 1.2] == 0.0)
