@@ -12,43 +12,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from benchmarks.rows import DOCS, Row, number, read, seconds, table, write
+from benchmarks.rows import DOCS, Row, dated, number, read, seconds, table, with_tables, write
 from benchmarks.solvers import SOLVERS
 
 TABLE = DOCS / "evidence/accuracy-and-speed.csv"
 PAGE = DOCS / "accuracy-and-speed.md"
 FIGURE = DOCS / "pictures/accuracy.png"
 CASES, SEED = 20, 31_000
-HEAD = """# Accuracy and speed
-
-The processor time of one solution against its error, for every solver of the package and for the methods of the papers
-and of the thesis, and whether the stated errors hold. Every row is made by solving random cases, each compared with a
-reference; no factor of an estimate was chosen on these cases. Made by
-
-```console
-$ python -m benchmarks accuracy
-```
-
-*Time* is the median of the cases on one thread, *error* what 90 % of the cases stay below, *stated* the median of the
-stated errors, and *held* the share of values whose error is at most the stated one. With 20 cases a share is known to
-about 5 to 10 per cent. `-` means that a method states no error. Times depend on the machine and on what else it does:
-compare them within one table, as ratios. The data are [a table](evidence/accuracy-and-speed.csv).
-
-![Error against time of every solver](pictures/accuracy.png)
-"""
 COLUMNS = ("cases", "method", "setting", "number", "time", "error", "stated", "held")
 
 
-def text(rows: Sequence[Row]) -> str:
-    """Return the text of the page."""
-    parts = [HEAD]
-    for name, solver in SOLVERS.items():
-        of_solver = [row for row in rows if row.solver == name]
-        if of_solver:
-            dates = " and ".join(sorted({row.measured for row in of_solver}))
-            parts.append(f"## {name[0].upper()}{name[1:]}\n\n{solver.about} Measured {dates}.\n")
-            parts.append(table(COLUMNS, [cells(row) for row in of_solver]) + "\n")
-    return "\n".join(parts)
+def text(page: str) -> str:
+    """Return the text of the page with the current tables."""
+    measured = {name: [row for row in read(TABLE) if row.solver == name] for name in SOLVERS}
+    tables = {name: dated(rows, table(COLUMNS, map(cells, rows))) for name, rows in measured.items() if rows}
+    return with_tables(page, tables)
 
 
 def cells(row: Row) -> tuple[str, ...]:
@@ -96,6 +74,5 @@ def main(*arguments: str) -> None:
         rows = list(SOLVERS[name].measure(cases, SEED))
         write(rows, TABLE)
         print(f"{name}\n{table(COLUMNS, [cells(row) for row in rows])}", flush=True)
-    rows = read(TABLE)
-    draw(rows)
-    PAGE.write_text(text(rows))
+    draw(read(TABLE))
+    PAGE.write_text(text(PAGE.read_text()))

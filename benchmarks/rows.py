@@ -73,6 +73,20 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)
 
 
+def dated(rows: Iterable[Row], text: str) -> str:
+    """Return a text below the dates of the rows."""
+    return f"Measured {' and '.join(sorted({row.measured for row in rows}))}.\n\n{text}"
+
+
+def with_tables(page: str, tables: Mapping[str, str]) -> str:
+    """Return the text of a page with these tables between their marks."""
+    for name, text in tables.items():
+        start, end = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
+        first, last = page.index(start) + len(start), page.index(end)
+        page = f"{page[:first]}{text}{page[last:]}"
+    return page
+
+
 def number(value: float, unit: str = "") -> str:
     """Return two digits of a number, or "-" if it is NaN."""
     return f"{float(f'{value:.1e}'):g}{unit}" if np.isfinite(value) else "-"

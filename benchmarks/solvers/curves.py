@@ -164,9 +164,6 @@ def drawn(kind, *choices):
 SOLVERS = (
     Solver(
         "master curves",
-        "Largest error of the shift factors of a family of curves, in decades, and the largest half width of their "
-        "95 % intervals. Reference: the planted factors. Shapes have a scatter of 0.01 decades. Polymers have an "
-        "unknown offset of 1 to 5 % common to both moduli, and noise of 1 to 3 %.",
         {
             "ten curves, five shapes": drawn(on_a_shape, *SHAPES),
             "curves that end in a plateau": drawn(on_a_plateau, *PLATEAUS),

@@ -165,8 +165,6 @@ def thesis_rollers(random: np.random.Generator) -> tuple[Revolution, Truth]:
 SOLVERS = (
     Solver(
         "line contact (EHL)",
-        "Error of the worse of central and minimum film. Reference of the heavy contacts (M > 200): another solver on "
-        "up to 10 241 nodes, known to 5e-6; of the whole box, where one in five is starved: the solver itself at 1e-6.",
         {"whole box": any_contact, "heavy": heavy_contact},
         {
             "accuracy": {f"{a:g}": partial(films, accuracy=a) for a in (1e-2, 1e-3, 3e-4, 1e-4)},
@@ -175,8 +173,6 @@ SOLVERS = (
     ),
     Solver(
         "mixed lubrication",
-        "Absolute error of the probability of breakthrough in one revolution of random rollers. Reference: the same "
-        "waves on 1.6 million points.",
         {"random rollers": rollers},
         {
             "points": {f"{points}": partial(revolution, points=points) for points in (50_000, 200_000)},
@@ -185,8 +181,6 @@ SOLVERS = (
     ),
     Solver(
         "breakthrough of one revolution",
-        "The same for the rollers of the thesis at 800 N and 40, 60 or 80 C, with the time of the transform. "
-        "Reference: splines on two million points; the thesis's sums over points tend to the same.",
         {"800 N": thesis_rollers},
         {
             "splines": {f"{points}": partial(splines, points=points) for points in (250_000, 500_000)},

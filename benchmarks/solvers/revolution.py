@@ -116,8 +116,6 @@ def kink(random: np.random.Generator) -> tuple[Image, Truth]:
 SOLVERS = (
     Solver(
         "wear",
-        "Largest error of the worn profile over the depth that can wear. Reference: the exact rule at 1e-4; simulating "
-        "every cycle, as the thesis did, tends to the same with the cells of its grid.",
         {
             "depth held": partial(wearing, False, False),
             "force held": partial(wearing, False, True),
@@ -133,8 +131,6 @@ SOLVERS = (
     ),
     Solver(
         "transforms",
-        "Largest error of the profile of an image: waves of 1 to 100 radians, and a parabola beyond a kink. Reference: "
-        "Bessel's J0 and a closed form.",
         {"waves": waves, "a kink": kink},
         {
             "Gauss sums": {f"tolerance {t:g}": partial(Image.by_sums, tolerance=t) for t in (1e-2, 1e-4, 1e-8)},

@@ -124,14 +124,9 @@ def on_grids(scheme, *grids: int) -> dict[str, Callable[[Any], Found | None]]:
     return {f"grid {grid}": partial(Sliding.found, request=Request(1.0, grid, scheme)) for grid in grids}
 
 
-REFERENCE = (
-    "Reference: one element followed along a fine line step by step, its losses summed, until grids agree to 1e-6."
-)
 SOLVERS = (
     Solver(
         "steady friction",
-        "Error of the friction of a Kelvin solid on generated lines of 128 Nyquist points. v tau times the rms slope "
-        f"is 0.03 to 3 rms heights. {REFERENCE}",
         {
             "transition": partial(on_plane, -0.5, 2),
             "full contact": partial(on_plane, 5, 10),
@@ -144,20 +139,16 @@ SOLVERS = (
     ),
     Solver(
         "indenters",
-        f"Error of the friction of a Kelvin solid under indenters of power-law shape. {REFERENCE}",
         {"smooth": partial(on_indenter, False), "rough": partial(on_indenter, True)},
         {"accuracy": to(0.1, 0.01, 0.001)},
     ),
     Solver(
         "general solids",
-        f"Error of the friction of solids of Prony terms on generated lines, one in three with a dashpot. {REFERENCE}",
         {"1 to 5 terms": partial(general, None), "50 terms, 20 decades": partial(general, 50)},
         {"accuracy": to(0.1, 0.01, 0.001)},
     ),
     Solver(
         "measured lines",
-        "Error of the friction on lines of 8 to 256 samples that are hard for a Fourier series: steps, spikes, "
-        f"plateaus, saw teeth, needles, noise. {REFERENCE}",
         {"Kelvin solid": partial(measured, False), "1 to 4 Prony terms": partial(measured, True)},
         {"accuracy": to(0.1, 0.01, 0.001)},
     ),

@@ -35,13 +35,12 @@ class Found(NamedTuple):
 class Solver:
     """One solver of the package, and other methods for comparison.
 
-    `about` defines the error and the truth. A function of `families` draws a case and its truth, or returns None if the
-    case has no solution. A function of `methods`, by method and setting, solves a case, or returns None if the method
-    does not apply. Of `rounds` calls the least time counts, because the first call may compile.
+    docs/accuracy-and-speed.md defines the error and the truth. A function of `families` draws a case and its truth, or
+    returns None if the case has no solution. A function of `methods`, by method and setting, solves a case, or returns
+    None if the method does not apply. Of `rounds` calls the least time counts, because the first call may compile.
     """
 
     name: str
-    about: str
     families: Mapping[str, Callable[[np.random.Generator], tuple[Any, Truth] | None]]
     methods: Mapping[str, Mapping[str, Callable[[Any], Found | None]]]
     rounds: int = 3

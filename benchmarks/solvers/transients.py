@@ -201,8 +201,6 @@ def by_model(case: VelocityJump, oversampling: int, per_decade: int) -> Found | 
 SOLVERS = (
     Solver(
         "velocity jump",
-        "Largest error of the friction at 20 times after a jump, over the friction at the end. Reference: every "
-        "element followed from rest on two fine grids, extrapolated.",
         {"by up to 20 %": partial(transient, -0.08, 0.08), "up to tenfold": partial(transient, -1, 1)},
         {
             "graded march": {
@@ -219,16 +217,11 @@ SOLVERS = (
     ),
     Solver(
         "levels of a jump",
-        "Error of the friction before, at and long after a jump up to tenfold, each over its value. Reference: the "
-        "solver itself at an accuracy of 1e-6.",
         {"up to tenfold": steady},
         {"accuracy": {f"{a:g}": partial(JumpCase.levels, accuracy=a) for a in (0.05, 0.01, 0.002)}},
     ),
     Solver(
         "loading histories",
-        "Largest error of the friction at 16 times over the largest friction: steps of velocity and force, ramps and "
-        "oscillations of planes, parabolas and cones. Reference: the solver itself on 24 nodes for every Nyquist "
-        "point; tests compare it with scipy's `solve_ivp`.",
         {"random": history},
         {
             "events on patches": {

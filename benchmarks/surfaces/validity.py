@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.rows import table
+from benchmarks.rows import table, with_tables
 from benchmarks.surfaces import punches, sliding_punch
 
 PAGE = Path(__file__).parents[2] / "docs/validity.md"
@@ -99,15 +99,10 @@ def main(*arguments):
         punches.compute(20, POINTS)
         sliding_punch.compute()
     draw(collected(POINTS))
-    PAGE.write_text(with_tables(PAGE.read_text()))
+    PAGE.write_text(text(PAGE.read_text()))
 
 
-def with_tables(page):
-    """Return the text of the page with the current tables between its marks."""
+def text(page):
+    """Return the text of the page with the current tables."""
     *parts, sliding = *tables(collected(POINTS)), table(sliding_punch.HEAD, sliding_punch.table_of_cases())
-    for name, text in zip(TABLES, (*parts, sliding), strict=True):
-        start, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-        before, _, rest = page.partition(start)
-        _, _, after = rest.partition(end)
-        page = f"{before}{start}{text}\n{end}{after}"
-    return page
+    return with_tables(page, dict(zip(TABLES, (*parts, sliding), strict=True)))
