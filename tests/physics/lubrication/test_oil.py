@@ -36,9 +36,11 @@ def test_every_correlation_rises_with_viscosity(name):
     assert 1e-9 < alpha[0] < alpha[1] < 4e-8
 
 
-def test_unknown_correlation_names_the_known_ones():
+def test_unknown_laws_name_the_known_ones():
     with pytest.raises(ValueError, match=r"expected one of the correlations gold_mineral.*got 'barus'"):
         oil.pressure_viscosity("barus", 1e-4, 0.1)
+    with pytest.raises(ValueError, match="expected the viscosity law barus or roelands, got 'free volume'"):
+        oil.log_viscosity("free volume", 1e8, 0.1, 2e-8)
 
 
 @pytest.mark.parametrize(
@@ -65,8 +67,3 @@ def test_roelands_has_the_slope_of_barus_and_stays_below_it():
     assert r[0] == pytest.approx(0.1)
     assert np.log(r[1] / r[0]) / 1e3 == pytest.approx(2e-8, rel=1e-4)  # linear in p up to p/p_r = 5e-6
     assert np.all(r[2:] < b[2:])
-
-
-def test_unknown_viscosity_law_names_the_known_ones():
-    with pytest.raises(ValueError, match="expected the viscosity law barus or roelands, got 'free volume'"):
-        oil.log_viscosity("free volume", 1e8, 0.1, 2e-8)

@@ -23,7 +23,7 @@ def test_half_integrals_of_powers_are_exact():
 
 
 def test_order_of_convergence():
-    """A smooth function: the error of the half-integral falls as the panels' power; printed as a table with -s."""
+    """A smooth function: the error of the half-integral falls as the panels' power."""
     errors = []
     for order in (2, 4, 6, 8):
         panels = graded_panels(2, 2, order)
@@ -31,7 +31,6 @@ def test_order_of_convergence():
         from scipy.special import j0
 
         errors.append(np.max(np.abs(half - j0(2 * panels.nodes) * np.cos(2 * panels.nodes))))
-        print(order, panels.nodes.size, errors[-1])
     assert all(later < 0.05 * earlier for earlier, later in itertools.pairwise(errors))
     assert errors[-1] < 1e-8
 

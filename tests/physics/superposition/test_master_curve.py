@@ -1,5 +1,7 @@
 """Shift factors of planted families: recovered, within intervals, independent of order and reference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,13 +62,9 @@ def test_rereferencing_is_fitting_with_another_reference():
 
 def test_a_reference_between_groups_contains_the_error_of_the_interpolation():
     groups, curves, _, _ = family(5)
-    free = superpose(groups, curves)
-    free = type(free)(
-        **(
-            vars(free)
-            | {"horizontal": 0.5 * groups**2, "draws": free.draws * 0 + np.append(0.5 * groups**2, groups * 0)}
-        )
-    )
+    found = superpose(groups, curves)
+    draws = found.draws * 0 + np.append(0.5 * groups**2, groups * 0)
+    free = replace(found, horizontal=0.5 * groups**2, draws=draws)
     plain = rereference(free, 2.5)
     errors = [interpolation_error(groups, free.horizontal, place) for place in (2.0, 2.1, 2.5, 2.9, 3.0)]
     assert errors == pytest.approx([0, 0.09 / 2, 1 / 8, 0.09 / 2, 0])

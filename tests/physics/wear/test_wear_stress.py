@@ -78,21 +78,3 @@ def test_tables_wear_as_their_formula(exponent, c, cycles):
         formula, measured = method(profile, c), method(table, table.inside(c**exponent))
         assert measured.wear_volume == pytest.approx(formula.wear_volume, rel=2e-3, abs=1e-6)
         assert measured.contact_radius == pytest.approx(formula.contact_radius, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("exponent", "c"),
-    [(0.3, 0.98), (0.5, 0.1), (1.0, 0.05), (2.0, 0.05), (2.0, 0.99), (3.0, 0.2), (5.0, 0.4), (8.0, 0.5), (20.0, 0.99)],
-)
-def test_constant_force(exponent, c):
-    """Force and energy are kept, f rises only, depth and border stay below those of the end; c^n >= 0.0025."""
-    profile, eta = PowerProfile(exponent), 1.0 - c**exponent
-    limit = exact(profile, c, [np.inf], 1e-3, constant_force=True)[0]
-    for worn in exact(profile, c, [1e-3, 3.0, 100.0], 1e-3, constant_force=True):
-        assert worn.normal_force == pytest.approx(limit.normal_force, rel=2e-4)
-        assert worn.wear_volume == pytest.approx(worn.energy_volume, rel=0.01, abs=1e-3 * eta)
-        assert 1.0 - 1e-6 <= worn.depth <= limit.depth * (1.0 + 1e-3)
-        assert c <= worn.stick_border <= limit.stick_border * 1.0002
-        assert worn.wear_volume <= limit.wear_volume * 1.003
-        r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
-        assert np.all(worn.height(r) >= profile.height(r) - 1e-3 * eta)
