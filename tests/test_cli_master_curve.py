@@ -96,13 +96,6 @@ def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
     np.testing.assert_allclose(moved["second_factor"]["data"], [-0.2, 0, 0.2], atol=2e-3)
 
 
-def test_vertical_factors_of_two_groups_are_refused(tmp_path, capsys):
-    path = tmp_path / "table.csv"
-    table_of_two_groups(path)
-    assert main(["master-curve", str(path), "--vertical", "free"]) == 2
-    assert "keep one value of 'temperature'" in capsys.readouterr().err
-
-
 def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
     path = tmp_path / "table.csv"
     table_of_two_groups(path)
@@ -117,5 +110,7 @@ def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
     assert capsys.readouterr().out.splitlines() == printed
     assert main(["master-curve", str(path), "--select", "humidity=1"]) == 2
     assert "(known: force, velocity, temperature, mu)" in capsys.readouterr().err
+    assert main(["master-curve", str(path), "--vertical", "free"]) == 2
+    assert "keep one value of 'temperature" in capsys.readouterr().err
     assert main(["master-curve", str(path), "--series", "one"]) == 2
     assert "a table has no series, got --series one" in capsys.readouterr().err

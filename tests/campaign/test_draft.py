@@ -92,11 +92,3 @@ def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
     assert "pin.yaml: this file exists already" in capsys.readouterr().err
     assert main(["init", "sliding_frition"]) == 2
     assert "(did you mean 'sliding_friction'?)" in capsys.readouterr().err
-
-
-def test_models_tells_what_belongs_together(capsys):
-    assert main(["models", "sliding_friction"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert all(len(line) <= 100 for line in told)
-    assert "length with rms_roughness, or length with surface, or surface" in told
-    assert any(line.startswith("material.kelvin, or material.standard_solid, or ") for line in told)

@@ -15,7 +15,7 @@ from mdr_dask.physics.surfaces.maps import (
     without_trend,
 )
 from mdr_dask.physics.surfaces.scans import Cut
-from mdr_dask.physics.surfaces.self_affine import fit_self_affine, noise_limit, steep_limit
+from mdr_dask.physics.surfaces.self_affine import fit_self_affine
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
 LENGTH = 0.02
@@ -115,24 +115,6 @@ def test_spikes_are_outliers_and_roughness_is_not(name):
         for row, column in places:
             spiky[row, column] += 60 * np.std(height)
         assert [*map(tuple, np.argwhere(outliers(SurfaceMap(spiky, (1e-3, 1e-3)))).tolist())] == places
-
-
-@pytest.mark.parametrize("hurst", HURST)
-def test_the_exponent_and_the_cut_offs_are_found(hurst):
-    """A roll-off at a sixteenth of the map, windowed: inside the interval; noise is distinguished from roughness."""
-    spectrum = self_affine(hurst, LENGTH, LENGTH / 200, 1e-6, LENGTH / 16)
-    height = areal_surface(spectrum, (512, 512), (LENGTH, LENGTH), 8, 0)
-    bins = spectrum_of_map(SurfaceMap(height, (LENGTH, LENGTH))).binned()
-    assert noise_limit(bins) == np.inf
-    fit = fit_self_affine(bins.until(steep_limit(bins)))
-    assert fit.hurst.low < hurst < fit.hurst.high
-    assert fit.hurst.high - fit.hurst.low < 0.2
-    assert fit.longest.low < LENGTH / 16 < fit.longest.high
-    crossing = 0.25 * np.pi * 512 / LENGTH
-    noise = np.sqrt(spectrum.at(crossing)) * 2 * np.pi * 512 / LENGTH  # spread over the area of all wave vectors
-    noisy = height + noise * np.random.default_rng(1).standard_normal(height.shape)
-    limit = noise_limit(spectrum_of_map(SurfaceMap(noisy, (LENGTH, LENGTH))).binned())
-    assert limit == pytest.approx(crossing, rel=0.3)
 
 
 @pytest.mark.parametrize(("longest", "shortest"), [(1e-2, 1e-5), (None, None)])
