@@ -192,7 +192,6 @@ def test_columns_that_may_be_positions_or_heights_need_names(columns, tmp_path):
 
 
 def test_units_in_a_file_are_used_and_must_not_contradict_options(tmp_path):
-    pytest.importorskip("SurfaceTopography")
     path = tmp_path / "gwyddion.txt"
     height = LENGTH * NY / NX * 1e6
     head = f"# Channel: Height\n# Width: {1e6 * LENGTH:g} µm\n# Height: {height:g} µm\n# Value units: nm\n"

@@ -197,27 +197,28 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file that SurfaceTopography can read; None for a text without a unit."""
+    """Return the main channel of a file that SurfaceTopography can read; None for a text, which this module reads."""
     file.read_bytes()  # to raise an error if the file has changed
     import warnings
 
-    is_text = file.name.lower().endswith(TEXT)
+    not_text = ""
+    if file.name.lower().endswith(TEXT):
+        try:
+            file.read_text()
+        except DataError as problem:  # such as a binary file of Zygo, which also ends in .dat
+            not_text = f" ({problem})"
+        else:
+            return None
     try:
         import SurfaceTopography
     except ImportError:
-        if is_text:
-            return None
         raise DataError(f"{file.name}: this format needs SurfaceTopography: pip install 'mdr_dask[formats]'") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # warnings of readers that only test whether they can read the file
-            channel = SurfaceTopography.open_topography(file.path).default_channel
+            return SurfaceTopography.open_topography(file.path).default_channel
     except Exception as problem:  # the readers raise errors of many types
-        if is_text:
-            return None
-        reason = type(problem).__name__
-        raise DataError(f"{file.name}: SurfaceTopography cannot read it: {reason}") from None
-    return None if is_text and channel.unit is None else channel
+        raise DataError(f"{file.name}: SurfaceTopography cannot read it: {type(problem).__name__}{not_text}") from None
 
 
 def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
@@ -299,7 +300,7 @@ def _grid_of_text(file: DataFile) -> _Grid:
     if (grid := _grid_file(file, lines)) is not None:
         return grid
     cells, first = _block(file, lines)
-    stated = _stated(file, lines[:first], lines[first])
+    stated = _stated(file, lines[:first], lines[first], cells.shape)
     if cells.shape[1] <= MOST_COLUMNS < len(cells):
         return _scattered(file, lines, first, cells, stated)
     if min(cells.shape) < LEAST_LINES:
@@ -320,13 +321,14 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks:
     return _Grid(heights, steps, stated, (*remarks, *found))
 
 
-def _stated(file: DataFile, head: list[str], first: str) -> Units:
+def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int]) -> Units:
     """Return the units and spacings that a file states before its heights.
 
     They are in lines of their own or in a corner cell such as ``y [um]``. A line that names heights or positions and
     ends in a unit of length states the unit of this quantity. A line that names a spacing states the value of the
-    spacing.
+    spacing. Gwyddion states the lengths of both sides of the map: ``Width: 10 um`` and ``Height: 10 um``.
     """
+    sides = {"width": ("spacing", shape[1]), "height": ("spacing_y", shape[0])}
     corner = re.split(r"[\t;,]", first)[0]
     head = [*head, f"position {corner}"] if re.search(r"[\[(]", corner) else head
     found: dict[str, dict[str, str]] = {}
@@ -340,6 +342,9 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
         if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
             key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
             found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
+        elif number and len(words) == 3 and words[0].casefold() in sides:
+            key, points = sides[words[0].casefold()]
+            found.setdefault(key, {})[f"{float(words[1]) / points} {words[2]}"] = line
         elif not number and bool(along) != bool(upwards):  # a line with names of both kinds names the columns
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
