@@ -501,8 +501,8 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
 def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> Read:
     """Read the requested columns of a table in SI, each of shape (rows,).
 
-    Columns without names must be in the order of `columns`. If `allow_missing` is true, missing entries become NaN. A
-    TableError contains at most one problem of each column.
+    Columns without names must be in the order of `columns`. If `allow_missing` is true, entries without a digit become
+    NaN. A TableError contains at most one problem of each column.
     """
     sheet, read, problems = read_sheet(text, source), Read(), []
     meanings = matched(sheet, columns)
@@ -572,7 +572,7 @@ def _values(
         return f"{text} {(si / before - zero) / factor:.6g}{f' {unit}' if si or zero else ''}"
 
     for row, text in enumerate(sheet.cells[:, place]):
-        if allow_missing and not _NUMBER.fullmatch(text) and _MISSING.fullmatch(text):
+        if allow_missing and not re.search(r"\d", text):
             continue
         if not _NUMBER.fullmatch(text):
             hint = " (remove the separators of thousands)" if _THOUSANDS.fullmatch(text) else ""
@@ -601,13 +601,13 @@ def _values(
 
 
 def numbers(sheet: Sheet) -> FloatArray:
-    """Return the entries of a table as numbers; missing entries and columns of words are NaN."""
+    """Return the entries of a table as numbers; entries without a digit and columns of words are NaN."""
     values = np.array([[float(text) if _NUMBER.fullmatch(text) else math.nan for text in row] for row in sheet.cells])
     is_numeric = ~np.all(np.isnan(values), axis=0)
     wrong = [
         (row, place)
         for row, place in np.argwhere(np.isnan(values) & is_numeric)
-        if not _MISSING.fullmatch(sheet.cells[row, place])
+        if re.search(r"\d", sheet.cells[row, place])
     ]
     if wrong:
         row, place = wrong[0]

@@ -27,7 +27,7 @@ def scan(heading="Weg/mm;Höhe [µm];Intensität", missing="", end=""):
 
 @pytest.mark.parametrize(
     ("heading", "missing"),
-    [("Weg/mm;Höhe [µm];Intensität", ""), ("X (mm);Z (um);I", "NaN"), ("Distance [mm];Height [µm];n", "****")],
+    [("Weg/mm;Höhe [µm];Intensität", ""), ("X (mm);Z (um);I", "NaN"), ("Distance [mm];Height [µm];n", "BAD")],
 )
 def test_scans_with_gaps_and_other_columns_are_read(heading, missing, tmp_path):
     found = read_scan(file_of(tmp_path, scan(heading, missing, "Ende der Messung")), Units())
