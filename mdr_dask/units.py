@@ -239,13 +239,13 @@ _FAR = 3.0
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
-    In the SI unit, a doubtful number differs from the first of the `usual` values by more than 3 decades. A number is
-    also doubtful if the unit of one of the usual values brings it nearer to the first.
+    A quantity is doubtful if it differs from the first of the `usual` values by more than 3 decades. Any number is
+    doubtful if the unit of one of the usual values brings it nearer to the first.
     """
     if value == 0:
         return False
     in_si = _decades(value, unit, usual[0])
-    return in_si > _FAR + 1e-9 or any(
+    return (in_si > _FAR + 1e-9 and unit != "1") or any(
         _decades(to_si(f"{value!r} {each}", unit), unit, usual[0]) < in_si for each in map(unit_behind, usual)
     )
 

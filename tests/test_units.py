@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdr_dask import models
+from mdr_dask.campaign.fields import usual, walk
 from mdr_dask.campaign.reference import output_rows, parameter_rows
 from mdr_dask.errors import did_you_mean, distinguishable
-from mdr_dask.questions.selection import written_apart
+from mdr_dask.models.base import unit_of
 from mdr_dask.units import expected, is_doubtful, likely, shown, shown_apart, to_si
 
 
@@ -99,6 +100,14 @@ def test_models_declare_units_that_are_si(name):
         assert to_si(f"1 {unit}", unit) == 1.0
 
 
+@pytest.mark.parametrize("name", models.NAMES)
+def test_every_quantity_declares_a_usual_value(name):
+    """A number without a unit is compared with the usual value. A path is also given without dimension."""
+    for path, kind, info, _ in walk(models.load(name).parameters):
+        if path != "path" and unit_of(kind, path.rpartition(".")[2]) not in ("1", "m^(1-n)", None):
+            assert usual(info), path
+
+
 @pytest.mark.parametrize(
     "value",
     [
@@ -131,6 +140,10 @@ def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
         (0.5, "m", ["10 mm"], "0.5 mm"),
         (40, "m", ["50 mm"], "40 mm"),
         (0.02, "m", ["10 mm"], None),
+        (0.885, "kg/m^3", ["870 kg/m^3", "0.87 g/cm^3"], "0.885 g/cm^3"),
+        (20, "1", ["0.25", "25 %"], "20 %"),
+        (2, "1", ["0.25", "25 %"], None),
+        (1e8, "1", ["10000"], None),
     ],
 )
 def test_a_number_without_a_unit_is_doubtful_where_another_unit_is_likelier(value, unit, usual, meant):
@@ -161,7 +174,6 @@ def test_a_number_and_its_limits_have_the_fewest_digits_that_distinguish_them():
     assert len(set(distinguishable(least, 0.1))) == 2
     assert shown_apart("m", 1e-3 * (1 + 1e-9), 1e-3) == ("1.000000001 mm", "1 mm")
     assert shown_apart("K", 293.15, 293.1501) == ("20 degC", "20.0001 degC")
-    assert written_apart("m/s", 0.1 * (1 + 1e-9), 0.1, 2.0) == ("0.1000000001 m/s", "0.1 m/s", "2 m/s")
 
 
 @pytest.mark.parametrize(

@@ -51,13 +51,13 @@ def questions(
                 continue
             unit = units.get(dotted(field), fields.unit_at(parameters, field, data) or "1")
             usual = fields.usual(found[0].model_fields[found[1]])
-            if usual and unit != "1" and is_doubtful(value, unit, usual):
+            if usual and is_doubtful(value, unit, usual):
                 asked.add(field)
                 yield str(Problem(document.place(at), dotted(at), _question(value, unit, usual)))
 
 
 def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
-    read = f"{value:g} {unit}"
+    read = f"{value:g} {unit}".removesuffix(" 1")
     meant = likely(value, unit, usual)
     if meant:
         return f"{value:g} is read as {read}: write {meant!r} if you mean that, {read!r} if not"

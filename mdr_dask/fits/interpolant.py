@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic, dense, left_out_error, linear
 from mdr_dask.models.base import Status
-from mdr_dask.questions.selection import written_apart
+from mdr_dask.units import shown_apart
 
 #: `LARGEST`: largest number of values of a table. `PIECES`: largest number of pieces into which an interval between two
 #: computed values is divided.
@@ -165,6 +165,6 @@ class Law:
             outside = values[~((values >= ends[0]) & (values <= ends[1]))]
             if outside.size:
                 unit = str(self.table[axis].attrs.get("units", "1"))
-                outlier, low, high = written_apart(unit, outside.flat[0], *ends)
+                outlier, low, high = shown_apart(unit, outside.flat[0], *ends)
                 raise DataError(f"expected {axis} from {low} to {high}, got {outlier}")
         return found

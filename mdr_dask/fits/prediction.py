@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
-from mdr_dask.questions.selection import written_apart
+from mdr_dask.units import shown_apart
 
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
@@ -125,10 +125,10 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
             off = (wanted < low - slack) | (wanted > high + slack)
         if off.any():
             worst = int(np.flatnonzero(off)[0])
-            measured_at, *known = written_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
+            measured_at, *known = shown_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
             place = f"{measured.source}:{measured.lines[worst].number}"
-            range_of_study = " to ".join(known) if held.ndim else f"{known[0]} only"
-            raise DataError(f"{place}: {name} is {measured_at}, but this study has {range_of_study}")
+            hint = "" if held.ndim else " only (delete the column to use this value)"
+            raise DataError(f"{place}: {name} is {measured_at}, but this study has {' to '.join(known)}{hint}")
     return dataset
 
 

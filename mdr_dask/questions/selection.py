@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.errors import DataError, did_you_mean, distinguishable
+from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.models.base import Status
 from mdr_dask.questions.columns import Columns, fixed_words
 from mdr_dask.questions.expression import SAME
@@ -102,11 +102,6 @@ def written(value: Any, unit: str | None, digits: int = 6) -> str:
     if not isinstance(value, int | float | np.number):
         return str(value)
     return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
-
-
-def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a value and limits as texts with a unit, with enough digits to distinguish the value from the limits."""
-    return distinguishable(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 
 def _parsed(text: str) -> tuple[str, str]:

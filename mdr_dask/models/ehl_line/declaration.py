@@ -96,6 +96,7 @@ class EhlLineParameters(Parameters):
     slide_roll_ratio: float = quantity(
         "1",
         "slide-roll ratio (u1 - u2)/u of the surface velocities u1 and u2 with the mean u; 0 is pure rolling",
+        usual="0.25, 25 %",
         ge=0,
         default=0.0,
     )

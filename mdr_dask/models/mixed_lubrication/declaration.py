@@ -136,7 +136,9 @@ class MixedLubrication(Parameters):
         default=STEEL,
         gt=0,
     )
-    resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
+    resistivity: float = quantity(
+        "ohm m", "electrical resistivity of the rollers", usual="2e-7 ohm m", default=2e-7, gt=0
+    )
     boundary_friction: float = quantity(
         "1", "coefficient of friction where the rollers are in intimate contact", default=0.1, ge=0
     )

@@ -41,17 +41,29 @@ class OilData(Parameters):
         description="table with the columns temperature and kinematic viscosity (or dynamic viscosity), in place of "
         "the two viscosities; Walther's law is fitted to it",
     )
-    density: float = quantity("kg/m^3", "density of the oil at density_temperature", usual="870 kg/m^3", gt=0)
-    density_temperature: float = quantity("K", "temperature at which the density was measured", default=288.15, gt=0)
+    density: float = quantity(
+        "kg/m^3", "density of the oil at density_temperature", usual="870 kg/m^3, 0.87 g/cm^3", gt=0
+    )
+    density_temperature: float = quantity(
+        "K", "temperature at which the density was measured", usual="15 degC", default=288.15, gt=0
+    )
     correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
         default="gold_mineral",
         description="correlation by which the pressure-viscosity coefficient follows from the viscosity",
     )
     lowest_temperature: float | None = quantity(
-        "K", "lowest allowed temperature; by default the lowest one with a known viscosity", default=None, gt=0
+        "K",
+        "lowest allowed temperature; by default the lowest one with a known viscosity",
+        usual="20 degC",
+        default=None,
+        gt=0,
     )
     highest_temperature: float | None = quantity(
-        "K", "highest allowed temperature; by default the highest one with a known viscosity", default=None, gt=0
+        "K",
+        "highest allowed temperature; by default the highest one with a known viscosity",
+        usual="100 degC",
+        default=None,
+        gt=0,
     )
 
     @model_validator(mode="after")

@@ -80,9 +80,9 @@ class RoundedCone(Parameters):
 
     shape: Literal["rounded_cone"]
     angle: float = quantity(
-        "rad", "angle between the surface of the cone and the plane that it touches", gt=0, lt=np.pi / 2
+        "rad", "angle between the surface of the cone and the plane that it touches", usual="10 deg", gt=0, lt=np.pi / 2
     )
-    tip_radius: float = quantity("m", "radius of curvature R of the tip", gt=0)
+    tip_radius: float = quantity("m", "radius of curvature R of the tip", usual="100 um", gt=0)
 
     def line(self) -> Shape:
         """Return the profile, in m, that replaces the body in the method of dimensionality reduction."""

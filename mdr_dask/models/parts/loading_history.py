@@ -42,11 +42,14 @@ class Steps(_History):
 
     shape: Literal["steps"]
     times: Numbers = quantity(
-        "s", "increasing times at which velocity and normal force change; none is negative", min_length=1
+        "s", "increasing times at which velocity and normal force change; none is negative", usual="1 ms", min_length=1
     )
-    velocities: Numbers = quantity("m/s", "velocity after each of the times", min_length=1)
+    velocities: Numbers = quantity("m/s", "velocity after each of the times", usual="100 mm/s", min_length=1)
     forces: Numbers | None = quantity(
-        "N", "normal force after each of the times; by default always the parameter `normal_force`", default=None
+        "N",
+        "normal force after each of the times; by default always the parameter `normal_force`",
+        usual="1 N",
+        default=None,
     )
 
     @model_validator(mode="after")
@@ -67,11 +70,15 @@ class Ramp(_History):
     shape: Literal["ramp"]
     duration: float = quantity("s", "duration of the ramp", usual="4 ms", gt=0)
     velocity: float | None = quantity(
-        "m/s", "velocity at the end of the ramp; by default the parameter `velocity` of the body", default=None
+        "m/s",
+        "velocity at the end of the ramp; by default the parameter `velocity` of the body",
+        usual="100 mm/s",
+        default=None,
     )
     force: float | None = quantity(
         "N",
         "normal force at the end of the ramp; by default the parameter `normal_force` of the body",
+        usual="1 N",
         default=None,
         gt=0,
     )
@@ -84,7 +91,7 @@ class Oscillation(_History):
     amplitude: float = quantity("m/s", "amplitude of the oscillating velocity", usual="20 mm/s", ge=0)
     frequency: float = quantity("Hz", "frequency of the oscillation", usual="250 Hz", gt=0)
     force_amplitude: float = quantity(
-        "N", "amplitude of the oscillating normal force, less than `normal_force`", default=0.0, ge=0
+        "N", "amplitude of the oscillating normal force, less than `normal_force`", usual="0.1 N", default=0.0, ge=0
     )
 
 

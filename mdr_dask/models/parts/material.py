@@ -44,7 +44,9 @@ class PronySeries(Parameters):
     static_modulus: float = quantity("Pa", "shear modulus under slow deformation", usual="3 MPa", gt=0)
     moduli: Numbers = quantity("Pa", "shear modulus of each Prony term", usual="10 MPa")
     times: Numbers = quantity("s", "relaxation time of each Prony term", usual="1 ms")
-    viscosity: float = quantity("Pa s", "viscosity of a dashpot in parallel with the spring", default=0.0, ge=0)
+    viscosity: float = quantity(
+        "Pa s", "viscosity of a dashpot in parallel with the spring", usual="10 kPa s", default=0.0, ge=0
+    )
 
     @model_validator(mode="after")
     def _a_time_for_every_modulus(self) -> PronySeries:

@@ -27,7 +27,11 @@ class ProfileFile(NamedByFile):
     unit: str = Field(default="", description="unit of the heights, if the file does not state it")
     x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
     spacing: float | None = quantity(
-        "m", "distance between neighbouring points, for a file of heights without positions", default=None, gt=0
+        "m",
+        "distance between neighbouring points, for a file of heights without positions",
+        usual="1 um",
+        default=None,
+        gt=0,
     )
     detrend: Literal["none", "mean", "line", "parabola"] = Field(
         default="mean", description="polynomial that is subtracted from the heights"
@@ -36,10 +40,10 @@ class ProfileFile(NamedByFile):
         "1", "part of the line in which heights fade to their mean, so that the ends meet", default=0.0, ge=0, le=1
     )
     shortest_wavelength: float | None = quantity(
-        "m", "shortest wavelength of the roughness; shorter waves are removed", default=None, gt=0
+        "m", "shortest wavelength of the roughness; shorter waves are removed", usual="10 um", default=None, gt=0
     )
     longest_wavelength: float | None = quantity(
-        "m", "longest wavelength of the roughness; longer waves are removed", default=None, gt=0
+        "m", "longest wavelength of the roughness; longer waves are removed", usual="1 mm", default=None, gt=0
     )
 
     @model_validator(mode="after")

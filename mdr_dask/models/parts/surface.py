@@ -36,10 +36,10 @@ class Surface(Parameters):
         default=None, description="height profile that is used unchanged as the rough line"
     )
     longest_wavelength: float | None = quantity(
-        "m", "longest wavelength of the roughness; longer waves are removed", default=None, gt=0
+        "m", "longest wavelength of the roughness; longer waves are removed", usual="1 mm", default=None, gt=0
     )
     shortest_wavelength: float | None = quantity(
-        "m", "shortest wavelength of the roughness; shorter waves are removed", default=None, gt=0
+        "m", "shortest wavelength of the roughness; shorter waves are removed", usual="10 um", default=None, gt=0
     )
     extrapolate: bool = Field(
         default=False, description="whether a power law extends the spectrum to the two wavelengths"

@@ -79,7 +79,11 @@ class HeightFiles(Files):
     """Heights along lines or on areas of a surface."""
 
     spacing: float | None = quantity(
-        "m", "distance between neighbouring points along x, for files of heights without positions", default=None, gt=0
+        "m",
+        "distance between neighbouring points along x, for files of heights without positions",
+        usual="1 um",
+        default=None,
+        gt=0,
     )
     unit: str = Field(default="", description="unit of the heights, if the file does not state it")
     x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
@@ -104,7 +108,7 @@ class MapFiles(HeightFiles):
     """Areal maps of a surface."""
 
     spacing_y: float | None = quantity(
-        "m", "distance between neighbouring rows, if it differs from `spacing`", default=None, gt=0
+        "m", "distance between neighbouring rows, if it differs from `spacing`", usual="1 um", default=None, gt=0
     )
     detrend: Literal["none", "mean", "plane", "parabola"] = Field(
         default="plane", description="polynomial that is subtracted from the heights"
