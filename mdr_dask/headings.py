@@ -19,11 +19,13 @@ temperature, T, temp, temperatur, ts, tr
 frequency, f, freq, omega, w, ω, angular frequency, frequency angular, frequenz, kreisfrequenz
 time, t, zeit
 velocity, v, speed, sliding velocity, sliding speed, load point velocity, geschwindigkeit, gleitgeschwindigkeit
-rotation speed, rotational speed, angular velocity, speed, drehzahl
+rotation speed, rotational speed, angular velocity, speed, n, drehzahl
 storage modulus, e', g', storage, e storage, g storage, e stor, g stor, e1, g1, speichermodul
 loss modulus, e'', g'', loss, e loss, g loss, e2, g2, verlustmodul
 modulus, relaxation modulus, e relax, g relax, e(t), g(t), E, G
 compliance, creep compliance, J, j(t)
+complex modulus, G*, E*, komplexer modul
+phase angle, delta, δ, phasenwinkel
 tan delta, tan d, tan δ, loss factor, damping factor, verlustfaktor
 friction coefficient, coefficient of friction, friction, coefficient, mu, μ, cof, reibwert, reibungszahl
 normal force, force, load, normal load, f n, F, kraft, normalkraft
@@ -33,8 +35,9 @@ wavenumber, q, k, wave number, wavevector, wave vector
 wavelength, lambda, λ
 C2D, C, c iso, areal spectrum, psd 2d, psd, c(q)
 C1D, C, line spectrum, psd 1d, psd, c(q)
-x, X, position, distance, length, weg
+x, X, position, pos, distance, length, weg
 height, z, Z, h, höhe
+radius, r
 wear volume, worn volume, verschleißvolumen
 """.splitlines()
 )  # fmt: skip

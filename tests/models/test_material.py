@@ -121,6 +121,14 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
     tangent = "frequency [rad/s],G' [MPa],tan delta [-]\n"
     close = moduli(tmp_path, tangent + "\n".join(f"{f!r},{s / 1e6!r},{loss / s!r}" for f, s, loss in ROWS))
     np.testing.assert_allclose(close.moduli, solid.moduli, rtol=1e-6, atol=1e-3)
+    polar = [(f, np.hypot(s, loss) / 1e6, np.degrees(np.arctan2(loss, s))) for f, s, loss in ROWS]
+    close = moduli(tmp_path, "f [rad/s],|G*| [MPa],delta [deg]\n" + "\n".join(f"{f},{g},{d}" for f, g, d in polar))
+    np.testing.assert_allclose(close.moduli, solid.moduli, rtol=1e-6, atol=1e-3)
+
+
+def test_an_isotherm_may_drift_by_a_kelvin(tmp_path):
+    rows = "\n".join(f"{f},{s},{loss},{t}" for (f, s, loss), t in zip(ROWS, np.linspace(59.3, 60.4, 5), strict=True))
+    moduli(tmp_path, "f [rad/s],G' [Pa],G'' [Pa],T [degC]\n" + rows)
 
 
 #: Curves of one solid at several temperatures, shifted by the law of Williams, Landel and Ferry and divided by b_T.

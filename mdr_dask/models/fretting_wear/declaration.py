@@ -68,7 +68,7 @@ class Table(Parameters):
 
 def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
     """Return radii and heights of a measured profile, in metres."""
-    table = read_table(file.read_text(), file.name, (Column("radius", "m", ("r",)), Column("height", "m", ("h", "f"))))
+    table = read_table(file.read_text(), file.name, (Column("radius", "m"), Column("height", "m", ("f",))))
     return table["radius"], table["height"]
 
 
@@ -166,7 +166,11 @@ class FrettingWear(Parameters):
     history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load in place of cycles")] = ()
     extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
     last_radius: float | None = quantity(
-        "m", "last radius of the profiles, in place of extent: radius and position are then lengths", gt=0, default=None
+        "m",
+        "last radius of the profiles, in place of extent: radius and position are then lengths",
+        usual="100 um",
+        gt=0,
+        default=None,
     )
     points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
 

@@ -34,8 +34,8 @@ class ModulusTable(NamedByFile):
 
     renamed: ClassVar[Mapping[str, str]] = {"arms_per_decade": "write terms_per_decade"}
     file: NamedFile = Field(
-        description="table with the columns frequency, storage modulus, and loss modulus or tan delta; optionally "
-        "temperature"
+        description="table with the columns frequency, storage modulus, and loss modulus or tan delta (or complex "
+        "modulus and phase angle); optionally temperature"
     )
     frequency_unit: str = Field(default="", description="unit of the frequencies, if the table does not state it")
     modulus_unit: str = Field(default="", description="unit of the moduli, if the table does not state it")
@@ -43,6 +43,7 @@ class ModulusTable(NamedByFile):
         "K",
         "use only the curves that were measured at this temperature. If the table has no column of temperatures, this "
         "is the temperature of all its rows",
+        usual="20 degC",
         default=None,
         gt=0,
     )
@@ -50,6 +51,7 @@ class ModulusTable(NamedByFile):
         "K",
         "reference temperature; the curves of all other temperatures are shifted along the frequency until they "
         "overlap. Without reference and table_temperature, wlf, arrhenius or shift_factors shift the curves",
+        usual="20 degC",
         default=None,
         gt=0,
     )
@@ -120,7 +122,7 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
         only = chosen.table_temperature
         return Moduli(omega, storage, loss, only, None if only is None else (only, only))
     ends = float(temperature.min()), float(temperature.max())
-    if ends[1] - ends[0] < SAME_TEMPERATURE:
+    if _near(temperature, float(temperature.mean())).all():
         return Moduli(omega, storage, loss, float(temperature.mean()), ends)
     if chosen.table_temperature is not None:
         near = _near(temperature, chosen.table_temperature)
@@ -238,23 +240,23 @@ def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) 
 
 
 def _table(chosen: ModulusTable) -> Read:
-    """Return the columns of the file."""
+    """Return the columns of the file; storage and loss modulus may be computed from complex modulus and phase angle."""
     name, content = chosen.file.name, chosen.file.read_text()
+
+    def modulus(kind: str, *other_names: str) -> Column:
+        return Column(kind, "Pa", other_names, needed=False, above=0, given_unit=chosen.modulus_unit)
+
     columns = (
         Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
-        Column(
-            "storage modulus",
-            "Pa",
-            ("tensile storage modulus", "Young's modulus"),
-            above=0,
-            given_unit=chosen.modulus_unit,
-        ),
-        Column("loss modulus", "Pa", ("tensile loss modulus",), needed=False, above=0, given_unit=chosen.modulus_unit),
+        modulus("storage modulus", "tensile storage modulus", "Young's modulus"),
+        modulus("loss modulus", "tensile loss modulus"),
         Column("temperature", "K", needed=False, above=0),
         Column("tan delta", "1", needed=False, above=0),
+        modulus("complex modulus"),
+        Column("phase angle", "rad", needed=False, above=0),
     )
     try:
-        return read_table(content, name, columns)
+        table = read_table(content, name, columns)
     except TableError as problem:
         headings = read_sheet(content, name).names
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
@@ -264,6 +266,18 @@ def _table(chosen: ModulusTable) -> Read:
                 "modulus (`mdr-dask master-curve` merges relaxation curves)"
             ) from problem
         raise
+    if {"complex modulus", "phase angle"} <= table.keys() and "storage modulus" not in table:
+        angle = table["phase angle"]
+        table["storage modulus"] = table["complex modulus"] * np.cos(angle)
+        table["loss modulus"] = table["complex modulus"] * np.sin(angle)
+        table.headings = {**table.headings, "storage modulus": table.headings["complex modulus"]}
+    if "storage modulus" not in table:
+        raise DataError(f"{name}: expected a column storage modulus, or columns complex modulus and phase angle")
+    if "loss modulus" not in table and "tan delta" in table:
+        table["loss modulus"] = table["storage modulus"] * table["tan delta"]
+    if "loss modulus" not in table:
+        raise DataError(f"{name}: expected a column 'loss modulus' or 'tan delta'")
+    return table
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
@@ -272,11 +286,7 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
     Raise DataError for moduli in tension without a Poisson ratio, and for shear moduli with a Poisson ratio.
     """
     name, table = chosen.file.name, _table(chosen)
-    omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
-    if loss is None and "tan delta" in table:
-        loss = storage * table["tan delta"]
-    if loss is None:
-        raise DataError(f"{name}: expected a column 'loss modulus' or 'tan delta'")
+    omega, storage, loss = (table[column] for column in ("frequency", "storage modulus", "loss modulus"))
     temperature, wanted = table.get("temperature"), chosen.table_temperature
     if temperature is not None and wanted is not None and np.count_nonzero(_near(temperature, wanted)) < 2:
         _, levels = _levels(temperature)
