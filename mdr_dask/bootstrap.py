@@ -143,34 +143,34 @@ def widening(count: ArrayLike) -> FloatArray:
     return wider
 
 
-def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
+def chance(residuals: FloatArray, count: int) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    `residuals` is a stack of the differences between data and law, with `draws` resamples. If the law holds, the first
+    `residuals` is a stack of the differences between data and law. If the law holds, the first
     row is about as large as the differences between the resamples and the first row. The result is NaN if there are too
     few resamples, for example with one realisation.
     """
-    caused = _caused(residuals, count, draws)
+    caused = _caused(residuals, count)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
 
 
 def scatter(residuals: FloatArray, count: int) -> float:
     """Return the rms residual that scatter and errors alone exceed with a probability of 5 %; NaN if unknown."""
-    caused = _caused(residuals, count, RESAMPLES)
+    caused = _caused(residuals, count)
     return float(np.quantile(caused, CONFIDENCE, method="higher")) if caused.size else np.nan
 
 
-def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
+def _caused(residuals: FloatArray, count: int) -> FloatArray:
     """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples.
 
     The residuals that errors cause are added as the root of the sum of squares, because groups affect different cases.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))
-    known = away[:draws][~np.isnan(away[:draws])]
+    known = away[:RESAMPLES][~np.isnan(away[:RESAMPLES])]
     if count < 2 or known.size < FEWEST:
         return np.empty(0)
-    moves = away[draws:]
+    moves = away[RESAMPLES:]
     by_errors = np.sqrt(np.nansum(np.fmax(moves[0::2], moves[1::2]) ** 2))
     caused: FloatArray = widening(count) * known + by_errors
     return caused

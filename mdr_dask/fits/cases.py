@@ -221,14 +221,9 @@ def constant(
     return {key: xr.Variable((), value, {"units": unit, "long_name": long_name}) for key, value in values.items()}
 
 
-def measure(name: str, value: float, long_name: str) -> Variables:
-    """Return a variable of the result for a number without a confidence interval."""
+def measure(name: str, value: float | str, long_name: str) -> Variables:
+    """Return the result variable of a number without a confidence interval, or of a sentence such as a verdict."""
     return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
-
-
-def text(name: str, sentence: str, long_name: str) -> Variables:
-    """Return the result variable that holds a sentence, such as a verdict."""
-    return {name: xr.Variable((), sentence, {"units": "1", "long_name": long_name})}
 
 
 def holds(stated: str, with_fitted: str = "") -> Variables:

@@ -41,8 +41,8 @@ def laws_of(
         if is_temperature:
             groups, sign = kelvins(groups, unit), sign_of(over)
             kelvin = float(kelvins(np.array([reference]), unit, groups=result.groups)[0])
-            about = groups, sign * factors, covariance, anchor, kelvin
-            fits = [shift_laws.fit_arrhenius(*about), shift_laws.fit_wlf(*about)]
+            about = groups, sign * factors, covariance, anchor
+            fits = [shift_laws.fit_arrhenius(*about), shift_laws.fit_wlf(*about, kelvin)]
         elif np.all(groups > 0):
             fits = [shift_laws.fit_power(groups, factors, covariance, anchor)]
     except FitError as problem:
@@ -73,17 +73,14 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
 
 def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
     """Return the constants of laws with their intervals, and the rms distance of the shift factors from each law."""
-    return {name: value for law in laws for name, value in _constants(law).items()}
-
-
-def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
     units = {"activation_energy": "J/mol", "c2": "K"}
-    found = {}
-    for key, (value, low, high) in law.constants.items():
-        for suffix, number in (("", value), ("_low", low), ("_high", high)):
-            found[f"{law.name}_{key}{suffix}"] = xr.Variable((), number, {"units": units.get(key, "1")})
     meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
-    found[f"{law.name}_residual"] = xr.Variable((), law.residual, meaning)
+    found = {}
+    for law in laws:
+        for key, numbers in law.constants.items():
+            for suffix, number in zip(("", "_low", "_high"), numbers, strict=True):
+                found[f"{law.name}_{key}{suffix}"] = xr.Variable((), number, {"units": units.get(key, "1")})
+        found[f"{law.name}_residual"] = xr.Variable((), law.residual, meaning)
     return found
 
 

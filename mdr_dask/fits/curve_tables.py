@@ -72,7 +72,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
         return wanted
-    loose = [each for each in columns if is_called(each, wanted) or _joined(each, wanted)]
+    loose = [each for each in columns if _is(each, wanted)]
     return loose[0] if loose and all(_agree(frame[loose[0]], frame[each]) for each in loose[1:]) else None
 
 
@@ -81,6 +81,10 @@ def _agree(one: pd.Series, other: pd.Series) -> bool:
     first, second = one.to_numpy(dtype=np.float64), other.to_numpy(dtype=np.float64)
     with np.errstate(all="ignore"):
         return any(np.ptp(each) <= AGREE * abs(np.median(each)) for each in (second / first, second - first))
+
+
+def _is(column: str, wanted: str) -> bool:
+    return column == wanted or is_called(column, wanted) or _joined(column, wanted)
 
 
 def _joined(column: str, wanted: str) -> bool:
@@ -154,10 +158,6 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
     if all(is_one(each, "modulus", "storage_modulus", "loss_modulus", unit="Pa") for each in ordinates):
         return "modulus"
     return "compliance" if all(is_one(each, "compliance", unit="1/Pa") for each in ordinates) else "none"
-
-
-def _is(column: str, name: str) -> bool:
-    return column_of(pd.DataFrame(columns=[column]), name) is not None
 
 
 def _has_unit(unit: str, wanted: str) -> bool:
@@ -241,5 +241,4 @@ def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[
 
 def is_temperature(by: str, unit: str = "") -> bool:
     """Return whether a column contains temperatures, judged by its name or its unit."""
-    named = column_of(pd.DataFrame(columns=[by]), "temperature") is not None or "temperature" in by.casefold()
-    return named or _has_unit(unit, "K")
+    return _is(by, "temperature") or "temperature" in by.casefold() or _has_unit(unit, "K")

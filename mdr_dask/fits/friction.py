@@ -34,9 +34,9 @@ from mdr_dask.fits.cases import (
     power_law,
     stated_power,
     table_of,
-    text,
 )
 from mdr_dask.physics.sliding import laws
+from mdr_dask.physics.surfaces import roughness
 
 MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
@@ -54,8 +54,6 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     if "hurst" not in data:
         raise FitError("expected the output rms_slope in the store of a measured surface, got none")
     require(data, "hurst", "points", "rms_roughness", "length")
-    from mdr_dask.physics.surfaces import roughness  # this module imports numba
-
     cutoffs = [data.coords.get(name, xr.DataArray(np.nan)) for name in ("rolloff_wavelength", "longest_wavelength")]
 
     def of_unit_line(hurst: float, points: float, *harmonics: float) -> float:
@@ -170,7 +168,7 @@ def _plateau(data: xr.Dataset) -> Variables:
         **measure(
             "decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {top.FLAT:.0%} of plateau"
         ),
-        **text("reached", reached, "whether friction reaches its maximum within the range of velocities"),
+        **measure("reached", reached, "whether friction reaches its maximum within the range of velocities"),
         **_root_two(data, found.height, known[flat], count, reached),
     }
 
@@ -194,7 +192,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
         of_contact = verdict(ratio[:, None] / math.sqrt(2) - 1, count) if "contact_slope" in data else NEEDS_SLOPE
     return {
         **constant("plateau_of_contact", ratio, count, meaning, positive=True),
-        **text("line_slope_holds", of_line, "whether mu = sqrt 2 times the rms slope of the whole line"),
+        **measure("line_slope_holds", of_line, "whether mu = sqrt 2 times the rms slope of the whole line"),
         **holds(of_contact),
     }
 

@@ -33,7 +33,6 @@ from mdr_dask.fits.cases import (
     measure,
     nonlinear,
     table_of,
-    text,
 )
 
 MODELS = ("velocity_jump",)
@@ -197,9 +196,9 @@ def _limit(
     """Return the mean of a number over some cases, and a sentence on whether the number equals the `stated` value."""
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
-        return nothing | text(verdict_name, "not tested: no case in this region", question)
+        return nothing | measure(verdict_name, "not tested: no case in this region", question)
     mean = constant(name, stack.mean(axis=1), count, meaning)
-    return mean | text(verdict_name, verdict(stack / stated - 1, count), question)
+    return mean | measure(verdict_name, verdict(stack / stated - 1, count), question)
 
 
 TRENDS = {

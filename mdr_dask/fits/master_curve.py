@@ -115,10 +115,7 @@ def _of_two_groups(
     """Shift curves that differ in two parameters; the reference is a value of the first parameter."""
     keys, curves = pairs_of(frame, over, ordinates, by)
     a, b = keys.T
-    first = np.unique(a)
-    zero = float(first[first.size // 2]) if reference is None else _inside(first, reference)
-    zeros = float(first[np.argmin(np.abs(first - zero))]), float(np.unique(b)[np.unique(b).size // 2])
-    found = two_shifts.superpose_twice(a, b, curves, zeros)
+    found = two_shifts.superpose_twice(a, b, curves, None if reference is None else _inside(np.unique(a), reference))
     units = frame.attrs.get("units", {})
     attrs = {"second": by[1], "second_reference": found.second.reference}
     attrs |= {"chi_squared": found.chi_squared, "probability": found.probability}

@@ -28,7 +28,6 @@ from mdr_dask.fits.cases import (
     one_value,
     rms,
     table_of,
-    text,
 )
 from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of
 
@@ -214,7 +213,7 @@ def _relaxation(case: xr.Dataset) -> Variables:
         **constants,
         **measure("law_rate", expected, "rate b by eq. 4.12"),
         **_closed_law(case, expected),
-        **text(
+        **measure(
             "fitted_law_holds", found.holds if found else "not tested: nothing relaxes", "whether one exponential fits"
         ),
     }

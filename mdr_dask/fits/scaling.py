@@ -27,7 +27,6 @@ from mdr_dask.fits.cases import (
     power_law,
     stated_power,
     table_of,
-    text,
 )
 from mdr_dask.fits.friction import (
     FRICTION,
@@ -146,7 +145,7 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
     known = (mean > 0) & (np.nan_to_num(slopes.mean()) > 0)
     beyond = np.flatnonzero(known & ~rising(force, velocity, mean, known))
     if not beyond.size:
-        return text("friction_follows", "not tested: no velocity beyond the largest friction", SLOPE_FOLLOWED)
+        return measure("friction_follows", "not tested: no velocity beyond the largest friction", SLOPE_FOLLOWED)
     count = table.count(beyond)
     ratios = bootstrap.difference(table.logarithms(beyond), slopes.logarithms(beyond))
     found = linear(np.ones((1, beyond.size)), ratios, count)
@@ -158,7 +157,7 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
         **measure(
             "fall", float(mean[beyond].max() / mean[beyond].min()), "largest over smallest mu beyond the maximum"
         ),
-        **text("friction_follows", found.holds(where), SLOPE_FOLLOWED),
+        **measure("friction_follows", found.holds(where), SLOPE_FOLLOWED),
     }
 
 

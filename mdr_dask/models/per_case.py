@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mdr_dask.arrays import random_stream
 from mdr_dask.models.base import Block, Result, Status
 
 #: Time in s after which a case raises TimeoutError; None for no limit. The limit applies only in a process that handles
@@ -43,7 +44,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         status = np.full(shape, Status.DONE, dtype=np.int8)
         found: dict[tuple[int, int], dict[str, NDArray[np.float64]]] = {}
         messages: dict[tuple[int, int], str] = {}
-        streams = [_stream(block.seed, realisation) for realisation in block.realisations]
+        streams = [random_stream(block.seed, realisation) for realisation in block.realisations]
         starts = [stream.bit_generator.state for stream in streams]
         for case in range(block.cases):
             parameters = block.case(case)
@@ -63,10 +64,6 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     compute.is_plain_python = True  # type: ignore[attr-defined]
     compute.__wrapped__ = solve  # type: ignore[attr-defined]
     return compute
-
-
-def _stream(seed: int, realisation: int) -> np.random.Generator:
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
 
 
 def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:

@@ -6,7 +6,8 @@ The fits are weighted with the inverse covariance of the factors.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.optimize import OptimizeResult, brentq, least_squares
@@ -45,21 +46,14 @@ class ShiftLaw:
         return float(np.sqrt(np.mean(self.departures**2)))
 
 
-def fit_power(
-    groups: FloatArray, factors: FloatArray, covariance: FloatArray, anchor: int, reference: float = 1.0
-) -> ShiftLaw:
-    """Fit ``factor = exponent log10(group / anchor)``; `anchor` is the index of the group whose factor is zero.
-
-    The argument `reference` is not used; it exists because all three fits have the same arguments.
-    """
+def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, anchor: int) -> ShiftLaw:
+    """Fit ``factor = exponent log10(group / anchor)``; `anchor` is the index of the group whose factor is zero."""
     if np.any(groups <= 0):
         raise FitError("a power law needs positive groups, such as velocities")
     return _one_constant("power", "exponent", lambda at: np.log10(at / groups[anchor]), groups, factors, covariance)
 
 
-def fit_arrhenius(
-    temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int, reference: float = 1.0
-) -> ShiftLaw:
+def fit_arrhenius(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int) -> ShiftLaw:
     """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_anchor)`` to temperatures in K; arguments as in `fit_power`."""
     if np.any(temperature <= 0):
         raise FitError("the law of Arrhenius needs absolute temperatures")
@@ -89,10 +83,9 @@ def fit_wlf(
     span = float(np.ptp(temperature))
     guess = np.array([-_slope(temperature - temperature[anchor], log_factors), 1 / (lowest + span)])
     ends = ([-np.inf, straight], [np.inf, steepest])
-    fitted = _fit("wlf", law, guess, temperature, log_factors, covariance, ends)
-    slope, bend = fitted.x
+    fitted, (slope, bend), spread, quantile = _fit("wlf", law, guess, temperature, log_factors, covariance, ends)
     factor, c2 = slope / bend**2, 1 / bend + moved
-    c1, half_of_bend = factor / c2, fitted.quantile * float(np.sqrt(fitted.spread[1, 1]))
+    c1, half_of_bend = factor / c2, quantile * float(np.sqrt(spread[1, 1]))
     if bend - half_of_bend <= straight:  # a straight line fits: one end of each interval is infinite
         least = 1 / min(bend + half_of_bend, steepest) + moved
         first, last = sorted([slope * (least - moved) ** 2 / least, float(np.copysign(np.inf, slope))])
@@ -102,11 +95,11 @@ def fit_wlf(
         change = np.array(
             [1 / (bend + bend**2 * moved), -slope * (1 + 2 * bend * moved) / (bend + bend**2 * moved) ** 2]
         )
-        half = fitted.quantile * float(np.sqrt(change @ fitted.spread @ change))
+        half = quantile * float(np.sqrt(change @ spread @ change))
         ratio = np.exp(min(half_of_bend / (bend**2 * gap), 700.0))
         near, far = (lowest + moved + gap * part for part in (1 / ratio, ratio))
         constants = {"c1": (c1, c1 - half, c1 + half), "c2": (c2, near, far)}
-    return fitted.law("wlf", constants)
+    return replace(fitted, constants=constants)
 
 
 def _slope(distance: FloatArray, factors: FloatArray) -> float:
@@ -126,22 +119,10 @@ def _one_constant(
     def law(constants: FloatArray, at: FloatArray) -> FloatArray:
         return np.asarray(constants[0] * distance(at), dtype=np.float64)
 
-    fitted = _fit(name, law, np.array([_slope(distance(groups), factors)]), groups, factors, covariance)
-    value, half = float(fitted.x[0]), fitted.quantile * float(np.sqrt(fitted.spread[0, 0]))
-    return fitted.law(name, {constant: (value, value - half, value + half)})
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    x: FloatArray
-    spread: FloatArray
-    quantile: float
-    factors: Callable[[FloatArray], FloatArray]
-    departures: FloatArray
-    chance: float
-
-    def law(self, name: str, constants: dict[str, tuple[float, float, float]]) -> ShiftLaw:
-        return ShiftLaw(name, constants, self.factors, self.departures, self.chance)
+    guess = np.array([_slope(distance(groups), factors)])
+    fitted, (value,), spread, quantile = _fit(name, law, guess, groups, factors, covariance)
+    half = quantile * float(np.sqrt(spread[0, 0]))
+    return replace(fitted, constants={constant: (float(value), float(value) - half, float(value) + half)})
 
 
 def _fit(
@@ -152,9 +133,10 @@ def _fit(
     factors: FloatArray,
     covariance: FloatArray,
     ends: tuple[list[float], list[float]] | None = None,
-) -> _Fitted:
-    """Fit by generalised least squares.
+) -> tuple[ShiftLaw, FloatArray, FloatArray, float]:
+    """Fit by generalised least squares; return a law without constants, and the constants.
 
+    The constants are their values, their covariance, and the half width of their interval in standard errors.
     If departures from the law exceed the errors of the factors, an additional scatter is fitted, whose square is added
     to the variances of the factors.
     """
@@ -190,9 +172,5 @@ def _fit(
     spread = np.asarray(np.linalg.pinv(found.jac.T @ found.jac), dtype=np.float64)
     quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
     best = np.asarray(found.x, dtype=np.float64)
-    chance = float(chdtrc(freedom, squares))
-
-    def fitted(at: FloatArray) -> FloatArray:
-        return law(best, at)
-
-    return _Fitted(best, spread, quantile, fitted, factors - law(best, groups), chance)
+    fitted = ShiftLaw(name, {}, partial(law, best), factors - law(best, groups), float(chdtrc(freedom, squares)))
+    return fitted, best, spread, quantile

@@ -33,21 +33,22 @@ def superpose_twice(
     first: ArrayLike,
     second: ArrayLike,
     curves: Sequence[tuple[ArrayLike, ArrayLike]],
-    references: tuple[float, float] | None = None,
-    seed: int = 0,
+    reference: float | None = None,
 ) -> TwoShifts:
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
     First all curves are superposed with independent factors. Then a and b are fitted to these factors, weighted by
-    their covariance; to first order, the result is as if a and b were fitted to the curves directly. The factors are
-    zero at the measured values nearest to `references`, by default at the middle values.
+    their covariance; to first order, the result is as if a and b were fitted to the curves directly.
+    The factors are zero at the middle value of each quantity; of the first, at the value nearest to `reference`.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
     if min(group.size for group in groups) < 2:
         raise DataError("two shifts need two or more different values of each quantity")
     order = _serpentine(places[0], places[1])
-    zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
+    zeros = [group.size // 2 for group in groups]
+    if reference is not None:
+        zeros[0] = int(np.argmin(np.abs(groups[0] - reference)))
     ordered = [place[order] for place in places]
     design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, ordered, strict=True)])
     columns = np.delete(np.arange(design.shape[1]), [zeros[0], groups[0].size + zeros[1]])
@@ -55,7 +56,7 @@ def superpose_twice(
         raise DataError(
             "the curves fall into sets that share no value of either quantity: add a curve that connects the sets"
         )
-    free = superpose(np.arange(order.size), [curves[k] for k in order], "none", 0.0, seed)
+    free = superpose(np.arange(order.size), [curves[k] for k in order], "none", 0.0)
     return _split(free, groups, ordered, zeros, design, columns)
 
 
@@ -122,7 +123,3 @@ def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np
     """Return an order of the curves: by `second`, then by `first`, alternately ascending and descending."""
     along = np.where(second % 2 == 0, first, first.max() - first)
     return np.lexsort((along, second))
-
-
-def _nearest(group: FloatArray, wanted: float | None) -> int:
-    return group.size // 2 if wanted is None else int(np.argmin(np.abs(group - wanted)))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.surfaces.waves import series, waves_of
+from mdr_dask.physics.surfaces.waves import waves_of
 
 Detrend = Literal["none", "mean", "line", "parabola"]
 
@@ -99,15 +99,6 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
     if longest > 0:
         waves[(number > 0) & (number < length / longest * (1 - 1e-12))] = 0
     return np.asarray(np.fft.irfft(waves, height.size), dtype=np.float64)
-
-
-def resampled(height: FloatArray, points: int) -> FloatArray:
-    """Return a periodic line at another number of points, computed from the Fourier series; the first point is kept.
-
-    With fewer points, waves shorter than the new Nyquist wavelength are omitted.
-    """
-    waves, mean = waves_of(height), height.mean()
-    return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)
 
 
 def rms_height(height: FloatArray) -> float:

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, random_stream
 from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
@@ -71,12 +71,8 @@ def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     number of waves. Lines that differ only in Hurst exponent, rms height or cut-off therefore have the same phases
     (thesis Fig. 2.6).
     """
-    phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
+    phase: FloatArray = 2 * np.pi * random_stream(seed, realisation).random(modes)
     return phase
-
-
-def _generator(seed: int, realisation: int) -> np.random.Generator:
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
 
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:

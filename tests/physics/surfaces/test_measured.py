@@ -1,4 +1,4 @@
-"""Measured lines: detrending, taper, band limits, resampling, statistics."""
+"""Measured lines: detrending, taper, band limits, statistics."""
 
 import numpy as np
 import pytest
@@ -58,12 +58,6 @@ def test_band_limits_keep_the_waves_between_them():
     assert measured.rms_height(kept) ** 2 == pytest.approx(np.sum(amplitude[9:50] ** 2) / 2, rel=1e-12)
 
 
-@pytest.mark.parametrize("points", [1024, 777, 513])
-def test_resampling_a_band_limited_line_is_exact(points):
-    height, _ = self_affine()
-    np.testing.assert_allclose(measured.resampled(height, points), self_affine(points)[0], atol=1e-18)
-
-
 def test_statistics_are_those_of_the_spectrum():
     height, amplitude = self_affine()
     q = 2 * np.pi * np.arange(1, amplitude.size + 1) / LENGTH
@@ -92,6 +86,5 @@ def test_rms_slope_is_that_of_the_line_that_solvers_slide_over(kind, points):
     height = {"noise": random.standard_normal(points), "alternating": np.where(np.arange(points) % 2 == 0, 1.0, -1.0)}[
         kind
     ]
-    finer = measured.resampled(height, 8 * points)
-    expected = np.sqrt(np.mean((waves_of(finer).slopes(finer.size) / LENGTH) ** 2))
+    expected = np.sqrt(np.mean((waves_of(height).slopes(8 * points) / LENGTH) ** 2))
     assert measured.rms_slope(height, LENGTH) == pytest.approx(expected, rel=1e-12)
