@@ -183,7 +183,7 @@ def _solve_plain(
     cycles, xi = np.where(fast, numbers.cycles[good], np.inf), np.where(fast, numbers.xi[good], 0.0)
     rows, back = _distinct(np.stack([numbers.exponent[good], numbers.level[good], cycles, xi]))
     pairs, to_pair = _distinct(rows[:2])
-    results = np.array(rules.limit_cases(pairs[0], pairs[1] ** (1.0 / pairs[0])))[:, to_pair]
+    results = rules.limit_cases(pairs[0], pairs[1] ** (1.0 / pairs[0]))[:, to_pair]
     finite = np.isfinite(rows[2])
     n, level, cycles, xi = rows[:, finite]
     stick = rows[1] ** (1.0 / rows[0])

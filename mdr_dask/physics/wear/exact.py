@@ -16,13 +16,14 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
-from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.wear.evolution import NotConvergedError, at, integral_along, march
 from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
     Scar,
     Worn,
+    beyond_table,
     check_stick_radius,
     contact_pressure,
     virgin_load,
@@ -101,10 +102,6 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * tip), edge, 4 - min(self.rougher, 2))
 
 
-#: Function that returns the contact after each wanted amount of wear, from a single solution at a given resolution.
-Solver = Callable[[Resolution], dict[float, Worn]]
-
-
 def exact(
     profile: Profile,
     stick_radius: float,
@@ -157,7 +154,7 @@ def exact(
     """
     wanted = sorted({float(amount) for amount in amounts})
     if stick_radius == 0.0:
-        solve: Solver = partial(_slid, profile, wanted, constant_force)
+        solve: Callable[[Resolution], dict[float, Worn]] = partial(_slid, profile, wanted, constant_force)
     else:
         check_stick_radius(stick_radius)
         solve = partial(_fretted, profile, stick_radius, wanted, constant_force)
@@ -188,21 +185,13 @@ class _Leg(NamedTuple):
         """The time of the last moment."""
         return float(self.moments[-1].time)
 
-    def at(self, time: float) -> tuple[Any, _Common]:
-        """Return the moment at a time, and the outputs that all kinds of slip have in common."""
+    def at(self, time: float) -> tuple[Any, float, int, float]:
+        """Return the moment at a time, the dissipated energy over mu, the steps, and the least error of the edge."""
         number, moment = at(self.problem, self.moments, time, self.tolerance)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
         first, last = (self.problem.edge(self.moments[k].unknowns) for k in (max(number - 1, 0), number))
-        return moment, _Common(float(energy), number, EDGE * abs(last - first))
-
-
-class _Common(NamedTuple):
-    """Dissipated energy divided by mu, number of steps, and lower limit of the stated error of the contact radius."""
-
-    energy: float
-    steps: int
-    edge_error: float
+        return moment, float(energy), number, EDGE * abs(last - first)
 
 
 def _fretted(
@@ -223,7 +212,8 @@ def _fretted(
     first = resolution.first * float(np.sqrt(problem.body.width))
 
     def stops(moment: SlipMoment) -> bool:
-        _refuse_beyond(problem.edge(moment.unknowns) <= profile.largest_radius, profile, c)
+        if problem.edge(moment.unknowns) > profile.largest_radius:
+            raise beyond_table(profile, c)
         return problem.border is None and bool(moment.unknowns[panels.mesh.order - 1] > JUMP)
 
     legs, start, energy = [], None, 0.0
@@ -231,7 +221,7 @@ def _fretted(
         problem, start = problem.under_force()
         moments = march(problem, np.inf if late else early[-1], resolution.step, first, start, stops)
         legs.append(_Leg(problem, moments, resolution.step))
-        energy = legs[0].at(moments[-1].time)[1].energy
+        energy = legs[0].at(moments[-1].time)[1]
         problem, start = problem.stop(moments[-1])
     if early and not (legs and legs[0].end >= early[-1]):
         moments = march(problem, early[-1], resolution.step, first, start, stops)
@@ -259,10 +249,8 @@ def _moved(profile: Profile, c: float, rise: float) -> float:
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
     """Return an upper bound of the contact radius under constant force.
 
-    The bound is the end of a table, or a radius at which the virgin profile is as high as the largest possible depth.
+    At this radius, the virgin profile is at least as high as the largest possible depth.
     """
-    if np.isfinite(profile.largest_radius):
-        return profile.largest_radius
     abscissa, weight = gauss(64)
     x = stick_radius + (1.0 - stick_radius) * abscissa
     slipping = (1.0 - stick_radius) * float((1.0 - profile.image(x)) @ weight)
@@ -273,33 +261,20 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
     return radius
 
 
-def _refuse_beyond(inside: bool, profile: Profile, c: float) -> None:
-    """Raise ValueError unless a contact lies inside the table of its profile."""
-    if not inside:
-        raise ValueError(
-            f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
-            f"extend the table or choose a larger stick radius (a smaller amplitude) than {c:.4g}"
-        )
+def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
+    """Return the image in the annulus that the border has passed, with its slope as a function of position.
 
-
-class _Frozen(NamedTuple):
-    """The image in the annulus that the border has passed: radii of the border, and the depths in d0 at these times."""
-
-    reached: FloatArray
-    depths: FloatArray
-
-    def slope(self, x: FloatArray) -> FloatArray:
-        """Return the slope of the image in the annulus at x."""
-        if self.reached.size == 1:
-            return np.zeros_like(x)
-        slopes = np.diff(self.depths) / np.diff(self.reached)
-        return np.asarray(slopes[np.clip(np.searchsorted(self.reached, x) - 1, 0, slopes.size - 1)])
-
-
-def _frozen(problem: PartialSlip, path: FloatArray) -> _Frozen:
+    The image follows from radii of the border, and the depths in d0 at these times.
+    """
     places, depths = rising(path)
     radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
-    return _Frozen(radii, 1.0 + problem.eta * depths[first])
+    reached = 1.0 + problem.eta * depths[first]
+    slopes = np.diff(reached) / np.diff(radii) if radii.size > 1 else np.zeros(1)
+
+    def slope(x: FloatArray) -> FloatArray:
+        return np.asarray(slopes[np.clip(np.searchsorted(radii, x) - 1, 0, slopes.size - 1)])
+
+    return radii, reached, slope
 
 
 def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
@@ -309,18 +284,18 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     radius a of the scar is the root of int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
-    border, frozen = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
+    border, (radii, reached, frozen_slope) = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
     # int_0^b g dx includes the annulus from c to b, where g = d' - eta; d' is the depth when the border was there
-    annulus = float(np.trapezoid((frozen.depths - 1.0) / eta - 1.0, frozen.reached))
+    annulus = float(np.trapezoid((reached - 1.0) / eta - 1.0, radii))
     load = float(problem.load or 0.0)
     depth = 1.0 + eta * (load + annulus) / border
 
     def change(x: FloatArray) -> FloatArray:
-        inside = np.interp(x, frozen.reached, frozen.depths) - 1.0 - profile.rise(x - c, c)
+        inside = np.interp(x, radii, reached) - 1.0 - profile.rise(x - c, c)
         return np.asarray(np.where(x < border, inside, depth - 1.0 + eta - profile.rise(x - c, c)))
 
     def slope(x: FloatArray) -> FloatArray:
-        return np.asarray(frozen.slope(x) * (x < border) - profile.image_slope(x))
+        return np.asarray(frozen_slope(x) * (x < border) - profile.image_slope(x))
 
     virgin = Scar(c, border, change, slope, _breaks(c, border))
 
@@ -329,7 +304,8 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
 
     high = min(border + 4.0 * (1.0 - c), profile.largest_radius)
     while not excess(high) > 0.0:
-        _refuse_beyond(high < profile.largest_radius, profile, c)
+        if high >= profile.largest_radius:
+            raise beyond_table(profile, c)
         high = min(1.5 * high, profile.largest_radius)
     scar = virgin._replace(radius=bisect(excess, border, high))
     force = 2.0 * (virgin_load(profile, c) + eta * load)
@@ -338,12 +314,12 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
 
 def _contact(leg: _Leg, time: float) -> Worn:
     """Turn the nodal values of partial slip at one time into a worn contact."""
-    problem, (moment, common) = leg.problem, leg.at(time)
+    problem, (moment, energy, steps, edge_error) = leg.problem, leg.at(time)
     assert isinstance(problem, PartialSlip)
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.inner_radius
     square, unknowns, path = problem.body.width, moment.unknowns, moment.path
     y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
-    frozen, slope = _frozen(problem, path), panels.slope @ y
+    (radii, reached, frozen_slope), slope = _frozen(problem, path), panels.slope @ y
     last_border = problem.radius(path[0, -2:][0])
     border, a, depth = problem.radius(max(place, 0.0)), problem.edge(unknowns), 1.0 + eta * deeper
 
@@ -360,12 +336,12 @@ def _contact(leg: _Leg, time: float) -> Worn:
 
     def change(x: FloatArray) -> FloatArray:
         slipping = depth - 1.0 + eta * nodal(y, x)
-        sticking = np.interp(x, frozen.reached, frozen.depths) - 1.0
+        sticking = np.interp(x, radii, reached) - 1.0
         return np.asarray(np.where(x < border, sticking, slipping) - profile.rise(x - c, c))
 
     def change_slope(x: FloatArray) -> FloatArray:
         slipping = 2.0 * eta * x / (square * width) * nodal(slope, x)
-        return np.asarray(np.where(x < border, frozen.slope(x), slipping) - profile.image_slope(x))
+        return np.asarray(np.where(x < border, frozen_slope(x), slipping) - profile.image_slope(x))
 
     breaks = (*_breaks(c, border), *(float(x) for x in np.sqrt(border**2 + square * width * panels.mesh.edges[1:-1])))
     scar = Scar(c, a, change, change_slope, breaks)
@@ -383,9 +359,9 @@ def _contact(leg: _Leg, time: float) -> Worn:
         height=height,
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, a, depth, border),
-        energy_volume=common.energy,
-        steps=common.steps,
-        least_errors={"contact_radius": common.edge_error, "stick_border": EDGE * (border - last_border)},
+        energy_volume=energy,
+        steps=steps,
+        least_errors={"contact_radius": edge_error, "stick_border": EDGE * (border - last_border)},
     )
 
 
@@ -412,7 +388,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
 def _slid_contact(leg: _Leg, path: float) -> Worn:
     """Turn the nodal values after one sliding path into a worn contact. Its image is NaN outside the contact."""
-    problem, (moment, common) = leg.problem, leg.at(path)
+    problem, (moment, energy, steps, edge_error) = leg.problem, leg.at(path)
     assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated
     image, a = problem.image(unknowns), problem.edge(unknowns)
@@ -432,12 +408,12 @@ def _slid_contact(leg: _Leg, path: float) -> Worn:
         stick_border=0.0,
         depth=float(image[-1]),
         normal_force=problem.wear_rate(unknowns),
-        wear_volume=common.energy,  # in gross slip V = int F ds exactly
+        wear_volume=energy,  # in gross slip V = int F ds exactly
         worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
-        energy_volume=common.energy,
-        steps=common.steps,
-        least_errors={"contact_radius": common.edge_error},
+        energy_volume=energy,
+        steps=steps,
+        least_errors={"contact_radius": edge_error},
     )

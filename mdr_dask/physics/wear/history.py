@@ -35,16 +35,6 @@ class LoadBlock:
     depth: float | None = None
     force: float | None = None
 
-    def __post_init__(self) -> None:
-        if (self.depth is None) == (self.force is None):
-            raise ValueError(
-                f"a block keeps either a depth or a force, got depth {self.depth!r} and force {self.force!r}"
-            )
-        if not (self.cycles >= 0.0 and self.slip_share > 0.0):
-            raise ValueError(
-                f"a block needs cycles >= 0 and a positive amplitude, got {self.cycles!r} and {self.slip_share!r}"
-            )
-
 
 def history(
     profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0, errors: bool = True

@@ -18,11 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_rise
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, worn_by
-
-#: Factor of the fast rule, fitted by eye in the thesis. The best factor lies between 0.9 and 1 (see docs/wear.md).
-THESIS_XI = 0.8
-
+from mdr_dask.physics.wear.worn import Scar, Worn, beyond_table, check_stick_radius, worn_by
 
 NODES = 16
 """Number of Gauss nodes in each of the four pieces of integration; it is sufficient for the accuracy `ERROR`."""
@@ -75,10 +71,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
     check_stick_radius(stick_radius)
     radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, _quadrature()))
     if np.isnan(radius):
-        raise ValueError(
-            f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
-            f"extend the table or choose a larger stick radius (a smaller amplitude) than {stick_radius!r}"
-        )
+        raise beyond_table(profile, stick_radius)
     return radius
 
 
@@ -96,7 +89,7 @@ def limit(profile: Profile, stick_radius: float) -> Worn:
     return _worn(profile, _rule(profile, stick_radius, 0.0), radius, stick_radius)
 
 
-def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESIS_XI) -> Worn:
+def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) -> Worn:
     """Return the worn contact by the fast rule.
 
     Parameters
@@ -108,32 +101,31 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESI
     cycles : float
         Number of cycles N >= 0, in units of N0.
     xi : float
-        Factor xi in the exponent xi N / a(c) of the fast rule, of the order of one.
+        Factor xi in the exponent xi N / a(c) of the fast rule. The thesis fitted 0.8 by eye; the best factor lies
+        between 0.9 and 1.
     """
     radius = limit_radius(profile, stick_radius)
     rest = max(math.exp(-xi * cycles / radius), LEAST)
     return _worn(profile, _rule(profile, stick_radius, rest), radius, 1.0)
 
 
-def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return contact radius, wear volume and normal force of the limiting profiles of power-law bodies."""
-    n, c = (np.array(part, dtype=float) for part in np.broadcast_arrays(exponent, stick_radius))
-    result = np.empty((3, n.size))
-    _limits(np.stack([n.ravel(), c.ravel()]), _NO_TABLE, _quadrature(), result)
-    radius, volume, force = result.reshape((3, *n.shape))
-    return radius, volume, force
+def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> FloatArray:
+    """Return contact radius, wear volume and normal force of limiting profiles of power-law bodies, shape (3, ...)."""
+    parts = np.broadcast_arrays(exponent, stick_radius)
+    cases = np.array([np.ravel(part) for part in parts], dtype=float)
+    return _limits(cases, _NO_TABLE, _quadrature()).reshape((3, *parts[0].shape))
 
 
 def fast_cases(
     exponent: ArrayLike, stick_radius: ArrayLike, cycles: ArrayLike, xi: ArrayLike, limit_radius: ArrayLike
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return scar radius, wear volume and normal force of power-law bodies by the fast rule; `limit_radius` is a(c)."""
+) -> FloatArray:
+    """Return scar radius, wear volume and normal force of power-law bodies by the fast rule, shape (3, ...).
+
+    `limit_radius` is a(c).
+    """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
-    cases = np.array([np.array(part, dtype=float).ravel() for part in parts])
-    result = np.empty((3, cases.shape[1]))
-    _fasts(cases, _NO_TABLE, _quadrature(), result)
-    radius, volume, force = result.reshape((3, *parts[0].shape))
-    return radius, volume, force
+    cases = np.array([np.ravel(part) for part in parts], dtype=float)
+    return _fasts(cases, _NO_TABLE, _quadrature()).reshape((3, *parts[0].shape))
 
 
 def _quadrature() -> Quadrature:
@@ -152,9 +144,7 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
     c, eta, rest = rule.c, rule.eta, rule.rest
 
     def change(x: FloatArray) -> FloatArray:
-        result = np.empty(x.size)
-        _changes(rule, x.ravel(), result)
-        return result.reshape(x.shape)
+        return _changes(rule, x.ravel()).reshape(x.shape)
 
     def slope(x: FloatArray) -> FloatArray:
         start = profile.rise(np.maximum(x - c, 0.0), c) / eta
@@ -202,9 +192,11 @@ def _change(rule: Rule, gap: float) -> float:
 
 
 @jit
-def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
+def _changes(rule: Rule, places: FloatArray) -> FloatArray:
+    result = np.empty(places.size)
     for k in range(places.size):
         result[k] = _change(rule, max(places[k] - rule.c, 0.0))
+    return result
 
 
 @jit
@@ -322,21 +314,25 @@ def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> floa
 
 
 @jit
-def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
-    """Write radius, volume and force of the cases (n, c) to `result`."""
+def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
+    """Return radius, volume and force of the cases (n, c)."""
+    result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         rule = _power_rule(no_table, cases[0, k], cases[1, k], 0.0)
         radius = _limit_radius(rule, np.inf, quadrature)
         result[0, k], result[1, k], result[2, k] = _numbers(rule, radius, quadrature)
+    return result
 
 
 @jit
-def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
-    """Write radius, volume and force of the cases (n, c, N, xi, a(c)) to `result`."""
+def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
+    """Return radius, volume and force of the cases (n, c, N, xi, a(c))."""
+    result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
         rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), LEAST))
         result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
+    return result
 
 
 @jit

@@ -182,7 +182,8 @@ class PartialSlip:
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
         if self.load is None:
-            worn = np.array([self._growth(moment) for moment in past])
+            virgin = np.array([_virgin_slip(self.body, place.width * self.panels.nodes) for place in places])
+            worn = np.log1p(np.maximum(worn, 0.0) / virgin)
         elif self.border is not None:
             worn = (worn - self.frozen) / np.sqrt(self.panels.nodes)
         earlier = Past(
@@ -196,32 +197,12 @@ class PartialSlip:
             past[0].path,
             self.carried(past[0].path),
         )
-
-        def known(unknowns: FloatArray) -> FloatArray:
-            result = np.empty(2 * self.size + 1)
-            _fill_known(self.mesh, self.body, earlier, self.place(unknowns), result)
-            return result
-
-        return known
-
-    def _growth(self, moment: SlipMoment) -> FloatArray:
-        """Return ln(s / s0) at the nodes for a border at its first position."""
-        virgin = np.empty(self.size)
-        _virgin_slip(self.body, self.place(moment.unknowns).width * self.panels.nodes, virgin)
-        return np.asarray(np.log1p(np.maximum(moment.accumulated, 0.0) / virgin))
-
-    def path_to(self, before: SlipMoment, place: Place) -> FloatArray:
-        """Return the path of the moment `before`, extended to `place` if the border moves."""
-        end = [[place.border], [place.depth]]
-        return before.path if self.border is not None else np.append(before.path, end, axis=1)
+        return lambda unknowns: _known(self.mesh, self.body, earlier, self.place(unknowns))
 
     def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
         """Return the worn depth at values of q that the border has passed."""
-        result = np.empty_like(place)
-        _plateau_rise(self.body, np.stack(rising(path)), place, result)
-        slip = np.empty_like(place)
-        _virgin_slip(self.body, place, slip)
-        return np.where(place > 0.0, result - slip, 0.0)
+        depth = _plateau_rise(self.body, np.stack(rising(path)), place) - _virgin_slip(self.body, place)
+        return np.where(place > 0.0, depth, 0.0)
 
     def worn_depth(self, moment: SlipMoment, q: FloatArray) -> FloatArray:
         """Return the worn depth at values of q; 0 beyond the edge."""
@@ -316,8 +297,10 @@ class PartialSlip:
         """Return the moment at the end of a solved step."""
         size, place = self.size, self.place(unknowns)
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
-        path, moved = self.path_to(past[0], place), np.empty(self.mesh.nodes.size)
-        _plateau_rise(self.body, path, place.border + place.width * self.mesh.nodes, moved)
+        path = past[0].path
+        if self.border is None:
+            path = np.append(path, [[place.border], [place.depth]], axis=1)
+        moved = _plateau_rise(self.body, path, place.border + place.width * self.mesh.nodes)
         return SlipMoment(time, unknowns, worn, path, moved)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
@@ -353,9 +336,10 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @jit
-def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
-    """Write the past contributions to s and to the worn depth at the nodes, and the load of the stick zone."""
-    nodes, path, is_still = result.size // 2, past.path, past.frozen == past.frozen
+def _known(mesh: Mesh, body: VirginBody, past: Past, place: Place) -> FloatArray:
+    """Return the past contributions to s and to the worn depth at the nodes, and the load of the stick zone."""
+    nodes, path, is_still = past.worn.shape[1], past.path, past.frozen == past.frozen
+    result = np.empty(2 * nodes + 1)
     border, depth = path[0, -1], path[1, -1]
     for i in range(nodes):
         q = place.border + place.width * mesh.nodes[i]
@@ -378,6 +362,7 @@ def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: 
     step = body.width * (place.border - border) / (first + last)
     # b d + int (1 - d) db along the path; the terms of the last step are combined to avoid cancellation
     result[2 * nodes] = first * place.depth + past.carried + step * (1.0 + 0.5 * (place.depth - depth))
+    return result
 
 
 @jit_inline
@@ -390,15 +375,19 @@ def _slip_at(body: VirginBody, q: float) -> float:
 
 
 @jit
-def _virgin_slip(body: VirginBody, places: FloatArray, result: FloatArray) -> None:
+def _virgin_slip(body: VirginBody, places: FloatArray) -> FloatArray:
+    result = np.empty_like(places)
     for i in range(places.size):
         result[i] = _slip_at(body, places[i])
+    return result
 
 
 @jit
-def _plateau_rise(body: VirginBody, path: FloatArray, places: FloatArray, result: FloatArray) -> None:
+def _plateau_rise(body: VirginBody, path: FloatArray, places: FloatArray) -> FloatArray:
+    result = np.empty_like(places)
     for i in range(places.size):
         result[i] = _rise(body, path, places[i])
+    return result
 
 
 @jit

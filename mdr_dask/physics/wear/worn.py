@@ -6,7 +6,7 @@ measured upwards from the virgin apex, so wear increases f.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,10 +15,8 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
-from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.refine import SAFETY
-
-Function = Callable[[FloatArray], FloatArray]
 
 #: Outputs that are functions of position, and the attributes of `Worn` that compute them; other outputs are numbers.
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
@@ -29,7 +27,6 @@ REACH = 5
 """The error of a function is the largest difference within this number of neighbours, because the difference of two
 functions vanishes where they intersect.
 """
-NOWHERE = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +91,12 @@ class Worn:
             largest = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
             return np.asarray(np.where(np.isfinite(value), self.relative_error * largest, np.nan))
         if output not in FUNCTIONS:
-            return max(SAFETY * float(self._distance(output)), self.least_errors.get(output, 0.0))
+            return max(SAFETY * float(self._distance(output, places)), self.least_errors.get(output, 0.0))
         crowd = self._crowd(float(places[-1]))
         wide = _spread(self._distance(output, crowd))
         return SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
 
-    def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
+    def _distance(self, output: str, places: FloatArray) -> FloatArray:
         """Return the difference from the first rougher solution, or half that from the second one if it is larger.
 
         Both are used, because two solutions may agree by chance.
@@ -232,23 +229,18 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
 def worn_by(profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float) -> Worn:
     """Return the worn contact for a scar, if the contact sticks up to `border` and carries load up to `edge`."""
+    slipping = scar.border + (scar.radius - scar.border) * np.linspace(0.0, 1.0, 201)[1:-1]
     return Worn(
         contact_radius=scar.radius,
         stick_border=border,
         depth=depth,
         normal_force=normal_force,
         wear_volume=worn_volume(scar),
-        worn_depth=largest_wear(scar),
+        worn_depth=float(np.max(worn_height(scar, slipping), initial=0.0)),
         height=worn_profile(profile, scar),
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, edge, depth, border),
     )
-
-
-def largest_wear(scar: Scar) -> float:
-    """Return the largest f - f0."""
-    r = scar.border + (scar.radius - scar.border) * np.linspace(0.0, 1.0, 201)[1:-1]
-    return float(np.max(worn_height(scar, r), initial=0.0))
 
 
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
@@ -280,6 +272,14 @@ def check_stick_radius(stick_radius: float) -> None:
             f"the stick radius must lie between 0 and 1 for partial slip, got {stick_radius!r}; "
             "an amplitude beyond mu E* d0 / G* is gross slip"
         )
+
+
+def beyond_table(profile: Profile, stick_radius: float) -> ValueError:
+    """Return the error for a contact that reaches beyond the table of its profile."""
+    return ValueError(
+        f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
+        f"extend the table or choose a larger stick radius (a smaller amplitude) than {stick_radius:.4g}"
+    )
 
 
 def virgin_load(profile: Profile, radius: float) -> float:

@@ -81,20 +81,6 @@ def test_smaller_amplitude_after_a_larger_one_leaves_the_old_border_alone():
     np.testing.assert_array_equal(first.height(stuck), second.height(stuck))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"cycles": 1.0, "slip_share": 0.5}, "either a depth or a force"),
-        ({"cycles": 1.0, "slip_share": 0.5, "depth": 1.0, "force": 1.0}, "either a depth or a force"),
-        ({"cycles": -1.0, "slip_share": 0.5, "depth": 1.0}, "cycles >= 0"),
-        ({"cycles": 1.0, "slip_share": 0.0, "depth": 1.0}, "positive amplitude"),
-    ],
-)
-def test_bad_blocks(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        LoadBlock(**arguments)
-
-
 def test_contact_beyond_the_grid():
     with pytest.raises(ValueError, match="beyond the table or grid"):
         history(PARABOLA, [LoadBlock(1.0, 0.5, depth=2.0)], cells=40, reach=1.2)
