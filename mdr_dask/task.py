@@ -6,7 +6,6 @@ import os
 import pickle
 import platform
 import time
-from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -42,11 +41,6 @@ class Work:
     # Number of times that the computation of the block was started, including this one.
     attempt: int
     operations: float
-
-    @property
-    def key(self) -> str:
-        """Series and index of the block as text."""
-        return f"{self.place.series or '-'} {'.'.join(map(str, self.place.index))}"
 
     def halves(self) -> tuple[Work, ...]:
         """Return two tasks with half of the results each, or no tasks if there is only one result."""
@@ -95,39 +89,20 @@ def run_block(work: Work) -> Outcome:
     clock = None if is_own else compile_clock()
     compiled = clock.seconds if clock else 0.0
     started = time.perf_counter()
-    if work.wanted.all():
-        result = _compute(model, work.block, is_own)
+    if (work.wanted | work.spared).all():
         shape = work.wanted.shape
-        values = {name: array.reshape(shape + array.shape[2:]) for name, array in result.values.items()}
-        status = result.status.reshape(shape)
+        values, status = _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
     else:
-        is_new = bool((work.wanted | work.spared).all())
-        if is_new:
-            shape = work.wanted.shape
-            values, status = _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
-        else:
-            values, status = store.read_block(work.place, work.block.outputs)
-        status[work.spared] = Status.NOT_NEEDED
-        result = _compute_part(model, is_own, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
+        values, status = store.read_block(work.place, work.block.outputs)
+    status[work.spared] = Status.NOT_NEEDED
+    result = _compute_part(model, is_own, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
     compiled = clock.seconds - compiled if clock else 0.0
     record = _record(work, result, status, middle - started)
     store.write_block(work.place, work.attempt, values if work.wanted.any() else {}, status, record)
     times = work.operations, middle - started, time.perf_counter() - middle, compiled
-    return Outcome(_counts(work, status), result.solves, *times, _warned(record))
-
-
-def finished(work: Work) -> Outcome | None:
-    """Return the outcome of a task that a worker finished before this worker died; None if the task is not finished.
-
-    The task is finished if the stored ledger of the block has the digest that is in the record of the attempt.
-    """
-    record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
-    if record is None or not store.is_written(work.place, record):
-        return None
-    _, status = store.read_block(work.place, ())
-    seconds, warned = record["compute_seconds"], _warned(record)
-    return Outcome(_counts(work, status), record["solves"], work.operations, seconds, 0.0, warned=warned)
+    warned = sum(message["status"] == "done" for message in record["messages"])
+    return Outcome(_counts(work, status), result.solves, *times, warned)
 
 
 def _other_version(work: Work) -> str:
@@ -139,10 +114,6 @@ def _other_version(work: Work) -> str:
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
     return tuple(np.bincount(status[work.wanted | work.spared], minlength=len(Status)).tolist())
-
-
-def _warned(record: Mapping[str, Any]) -> int:
-    return sum(message["status"] == Status.DONE.name.lower() for message in record["messages"])
 
 
 #: Errors that come from a fault of the machine and not from a case: for example, the cache of the compiler is broken, a

@@ -13,11 +13,10 @@ import psutil
 import pytest
 from test_execute import digests, run, values
 
-from mdr_dask import execute, store, task
+from mdr_dask import execute, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources, clusters, executors
-from mdr_dask.models.base import Status
+from mdr_dask.execute import Resources, clusters
 
 
 @pytest.fixture
@@ -147,27 +146,3 @@ def listening_beyond_this_machine() -> list[str]:
         for each in psutil.Process().net_connections("inet")
         if each.status == psutil.CONN_LISTEN and each.laddr.ip not in ("127.0.0.1", "::1")
     ]
-
-
-@pytest.mark.parametrize("retry", [False, True], ids=["first attempt", "retry of failures"])
-def test_a_block_whose_worker_died_untold_is_found_in_the_ledger(toy, url, retry, monkeypatch):
-    """The same task again, as the scheduler would send it to another worker."""
-    campaign = toy.campaign(toy.axis("position", [1.0, 3.0]), fail_above=2.0)
-    if retry:
-        run(campaign, url)
-    sent = []
-    monkeypatch.setattr(execute.rounds, "_merge", lambda *_: None)  # records are merged at the end of a run
-    monkeypatch.setattr(executors, "run_block", lambda work: sent.append(work) or task.run_block(work))
-    run(campaign, url, retry_failed=retry)
-    (work,) = sent
-    toy.COMPUTED.clear()
-    again = task.finished(work)
-    assert again is not None
-    assert sum(again.counts) == work.wanted.sum()
-    assert again.counts[Status.FAILED] == 6
-    record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
-    assert (again.compute_seconds, again.write_seconds) == (record["compute_seconds"], 0.0)
-    assert toy.COMPUTED == []
-    assert task.finished(replace(work, attempt=work.attempt + 1)) is None
-    (Path(url) / "status/c/0/0").unlink()  # a record, and no ledger yet
-    assert task.finished(work) is None

@@ -9,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy import fft
 
 from mdr_dask.physics.surfaces import roughness
@@ -18,7 +19,6 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from references.areal import areal_surface
 
 TABLE = Path(__file__).parents[2] / "docs/evidence/punches.csv"
-COLUMNS = ("body", "hurst", "points", "index", "load", "approach", "contact", "gap")
 HURST = (0.3, 0.5, 0.8)
 LOADS = np.geomspace(1e-4, 1, 9)  # F / (E* L h)
 HEIGHT = 1e-3  # h / L; its value does not matter, because the problem is linear
@@ -91,25 +91,23 @@ def half_space(hurst, points, index):
 
 
 def rows():
-    """Read the table of results as a list of dictionaries."""
-    if not TABLE.exists():
-        return []
-    with TABLE.open() as stream:
-        return list(csv.DictReader(stream))
+    """Read the table of results."""
+    return pd.read_csv(TABLE)
+
+
+def append(table, values):
+    """Append rows of numbers and texts to a table."""
+    with table.open("a", newline="") as stream:
+        texts = ([f"{x:.6g}" if isinstance(x, float) else x for x in row] for row in values)
+        csv.writer(stream, lineterminator="\n").writerows(texts)
 
 
 def compute(surfaces=20, points=512):
     """Compute the missing rows, and append them to the table after each surface or line."""
-    known = {(row["body"], float(row["hurst"]), int(row["points"]), int(row["index"])) for row in rows()}
+    known = set(rows()[["body", "hurst", "points", "index"]].itertuples(index=False, name=None))
     for body, function, count in (("line", line, LINES), ("half-space", half_space, surfaces)):
         for index in range(count):
             for hurst in HURST:
-                if (body, hurst, points, index) in known:
-                    continue
-                columns = function(hurst, points, index)
-                new = not TABLE.exists()
-                with TABLE.open("a", newline="") as stream:
-                    writer = csv.writer(stream, lineterminator="\n")
-                    writer.writerows([COLUMNS] if new else [])
-                    for load, *numbers in zip(LOADS, *columns, strict=True):
-                        writer.writerow([body, hurst, points, index, *(f"{x:.6g}" for x in (load, *numbers))])
+                if (body, hurst, points, index) not in known:
+                    numbers = np.transpose([LOADS, *function(hurst, points, index)])
+                    append(TABLE, [(body, hurst, points, index, *row) for row in numbers.tolist()])

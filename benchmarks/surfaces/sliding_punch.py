@@ -3,27 +3,24 @@
 ``python -m benchmarks validity`` computes the rows that are missing in docs/evidence/sliding_punch.csv.
 """
 
-import csv
+import itertools
 import sys
 import tempfile
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy import fft
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from benchmarks.solvers.solver import one_case
-from benchmarks.surfaces.punches import areal_surface, free_half_space, spectrum
+from benchmarks.surfaces.punches import append, areal_surface, free_half_space, spectrum
 from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.surfaces.maps import wavenumbers
 
 TABLE = Path(__file__).parents[2] / "docs/evidence/sliding_punch.csv"
-COLUMNS = (
-    *("points", "surfaces", "deborah", "depth", "load", "friction", "friction_error"),
-    *("line", "line_error", "area", "length"),
-)
 HEADING = "q [rad/m],C2D [m^4]"
 HURST, SEED = 0.8, 15
 DEBORAH = (0.01, 0.1)  # v tau / L; at higher values, periodic images of the punch interact
@@ -119,36 +116,21 @@ def case(points, surfaces, deborah, depth):
     return load.mean(), friction.mean(), spread, mean, error, area.mean(), length
 
 
-def rows():
-    """Read the table of results as a list of dictionaries of numbers."""
-    if not TABLE.exists():
-        return []
-    with TABLE.open() as stream:
-        return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(stream)]
-
-
 def compute(points=128, surfaces=2):
     """Compute the missing rows, and append them to the table after each case."""
-    known = {tuple(row[name] for name in COLUMNS[:4]) for row in rows()}
-    for deborah in DEBORAH:
-        for depth in DEPTHS:
-            if (points, surfaces, deborah, depth) in known:
-                continue
+    known = set(pd.read_csv(TABLE)[["points", "surfaces", "deborah", "depth"]].itertuples(index=False, name=None))
+    for deborah, depth in itertools.product(DEBORAH, DEPTHS):
+        given = points, surfaces, deborah, depth
+        if given not in known:
             try:
-                numbers = case(points, surfaces, deborah, depth)
+                append(TABLE, [(*given, *map(float, case(*given)))])
             except RuntimeError as problem:
                 print(f"v tau / L = {deborah}, depth {depth}: {problem}", file=sys.stderr)
-                continue
-            new = not TABLE.exists()
-            with TABLE.open("a", newline="") as stream:
-                writer = csv.writer(stream, lineterminator="\n")
-                writer.writerows([COLUMNS] if new else [])
-                writer.writerow([points, surfaces, deborah, depth, *(f"{number:.6g}" for number in numbers)])
 
 
 def table_of_cases():
     """Yield the rows of the table in docs/validity.md."""
-    for row in sorted(rows(), key=lambda row: (row["points"], row["deborah"], row["load"])):
+    for row in pd.read_csv(TABLE).sort_values(["points", "deborah", "load"]).to_dict("records"):
         yield (
             *(f"{row[name]:g}" for name in ("points", "surfaces", "deborah")),
             f"{row['load']:.3g}",

@@ -23,13 +23,9 @@ BODIES = ("half-space", "line")
 
 def collected(points):
     """Return arrays of approach, contact and gap (realisations, loads), by kind of body and Hurst exponent."""
-    found = {}
-    for row in punches.rows():
-        if int(row["points"]) == points:
-            key = row["body"], float(row["hurst"])
-            numbers = [float(row[name]) for name in ("approach", "contact", "gap")]
-            found.setdefault(key, {}).setdefault(int(row["index"]), []).append(numbers)
-    return {key: np.array(list(each.values())).transpose(2, 0, 1) for key, each in found.items()}
+    known = punches.rows().query(f"points == {points}").groupby(["body", "hurst"], sort=False)
+    columns = ["approach", "contact", "gap"]
+    return {key: np.moveaxis(each[columns].to_numpy().reshape(-1, punches.LOADS.size, 3), 2, 0) for key, each in known}
 
 
 def stiffness(approach):

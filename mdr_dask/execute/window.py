@@ -17,7 +17,8 @@ from distributed.comm import CommClosedError
 from mdr_dask.errors import ClusterError, ModelError
 from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
-from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
+from mdr_dask.plan import BlockIndex
+from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
 
 #: Time in s between two checks of the cluster. This time and `REPORT_PAUSE` together are less than five seconds, so a
 #: user soon learns that there is no worker.
@@ -68,7 +69,7 @@ class TaskWindow:
     def run(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks. If the worker of a block dies, compute the block once more, in a child process."""
         remaining = iter(works)
-        suspects: set[str] = set()
+        suspects: set[tuple[str, BlockIndex]] = set()
 
         def fill() -> None:
             free = 2 * max(self._threads, self._most) + 2 - len(self._running)
@@ -92,8 +93,9 @@ class TaskWindow:
                     continue
                 work = self._running.pop(future)
                 future.release()
-                if outcomes is None and work.key not in suspects:
-                    suspects.add(work.key)
+                block = work.place.series, work.place.index
+                if outcomes is None and block not in suspects:
+                    suspects.add(block)
                     self._submit(_run_apart, work)
                     continue
                 if outcomes is None:
@@ -163,13 +165,9 @@ def _outcomes(future: Future) -> Outcomes | None:
 
 
 def _run(work: Work, _: float | None) -> Outcomes:
-    """Compute a block in a worker, unless another worker has already written it, but died before reporting this."""
-    outcome = finished(work)
-    if outcome is None:
-        _report(work)
-        one_blas_thread()
-        outcome = run_block(work)
-    return [(work, outcome)]
+    _report(work)
+    one_blas_thread()
+    return [(work, run_block(work))]
 
 
 def _run_apart(work: Work, limit: float | None) -> Outcomes:

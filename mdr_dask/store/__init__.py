@@ -5,7 +5,7 @@ result. The process that computes a block writes it in this order: the record wi
 chunk of every output, the chunk of ``status``. Readers use only the root ``zarr.json``, which is replaced in one write.
 """
 
-from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block
+from mdr_dask.store.blocks import Place, layout_mark, read_block, values, write_block
 from mdr_dask.store.files import absolute
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import Finding, is_laid_out, lay_out
@@ -13,7 +13,7 @@ from mdr_dask.store.ledgers import ledger, require_undamaged
 from mdr_dask.store.locks import Lock, Part, active_runs, at_work, exclusive, gate, shared, while_locked
 from mdr_dask.store.packing import contents, verify_packed
 from mdr_dask.store.reading import datasets, is_damage, readable, save
-from mdr_dask.store.records import attempts, kinds, merge_records, record, records
+from mdr_dask.store.records import attempts, kinds, merge_records, records
 from mdr_dask.store.study import attributes, exists, is_study, series_names
 from mdr_dask.store.verification import CHECKSUMS, PUBLISHED, Inspection, repair, verify
 
@@ -39,7 +39,6 @@ __all__ = [
     "is_damage",
     "is_laid_out",
     "is_study",
-    "is_written",
     "kinds",
     "lay_out",
     "layout_mark",
@@ -48,7 +47,6 @@ __all__ = [
     "read_block",
     "readable",
     "reconcile",
-    "record",
     "records",
     "repair",
     "require_undamaged",

@@ -77,12 +77,6 @@ def write_block(
         write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])
 
 
-def is_written(place: Place, record: Mapping[str, Any]) -> bool:
-    """Return whether the stored ledger of a block has the digest that is in a record."""
-    content = read_bytes(place.url, chunk_name(place.series, "status", place.index))
-    return content is not None and record.get("chunks", {}).get("status") == digest(content)
-
-
 def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
     """Return the values and the ledger of a block, as arrays that the caller may change."""
     arrays = _arrays(place.url, place.series, place.layout)

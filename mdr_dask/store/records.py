@@ -19,7 +19,6 @@ from mdr_dask.store.files import (
     chunk_name,
     group_name,
     listed,
-    read_bytes,
     read_many,
     remove,
     without_digest,
@@ -61,12 +60,6 @@ def _is_message(message: Mapping[str, Any]) -> bool:
     texts = type(message["message"]) is str and message["status"] in ("done", "not_converged", "failed", "not_needed")
     plain = all(isinstance(value, str | int | float | None) for value in message["case"].values())
     return texts and plain and all(type(i) is int and i >= 0 for i in message.get("place", ()))
-
-
-def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:
-    """Return the record of an attempt at a block, or None if it is damaged or has no file of its own."""
-    content = read_bytes(url, name_of(series, index, attempt))
-    return None if content is None else decoded(content)
 
 
 def lines(url: str, series: str) -> Iterator[tuple[str, bytes]]:
