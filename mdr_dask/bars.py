@@ -35,7 +35,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
         with _live() as draw, _beating(draw, LIVE_PAUSE) as show:
             yield show
     else:
-        with _beating(_print_line, PAUSE) as show:
+        with _beating(lambda *known: _write(describe(*known)), PAUSE) as show:
             yield show
 
 
@@ -110,10 +110,6 @@ def _in_notebook() -> Iterator[Draw]:
 def _html(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     done = f'value="{progress.total - progress.to_do}" max="{max(progress.total, 1)}"' if progress else ""
     return f"<progress {done}></progress> {describe(progress, elapsed, unchanged)}"
-
-
-def _print_line(progress: Progress | None, elapsed: float, unchanged: float) -> None:
-    _write(describe(progress, elapsed, unchanged))
 
 
 def _write(line: str) -> None:

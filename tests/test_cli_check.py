@@ -145,6 +145,7 @@ def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, 
         "10.01 mm/s; line 5, relaxation_times 100",
     ):
         assert f"  {line}\n" in printed
+    assert "measured rig.csv: compared with friction_coefficient: coefficient of friction" in printed
 
 
 def test_check_names_the_defaults_that_have_an_effect(capsys):

@@ -32,7 +32,7 @@ WAY, LAST = 12, 0.1
 
 def stepped(line, deborah: float, load: float, nodes: int) -> float:
     """Return friction by time stepping until the line slides steadily, for unit length and unit modulus."""
-    height = line.heights(nodes)
+    height = line.roughness.heights(nodes)
     slope = (height - np.roll(height, 1)) * nodes  # slope of the cell just passed, so that the work is exact
     damping = deborah * nodes  # damping of a spring during one step of one cell
     steps = max(int(WAY * deborah * nodes), 20)

@@ -163,6 +163,7 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
         errors = f"{found.error_column} taken as one standard error"
     reach = (shown(float(end), unit) for end in (found.values.min(), found.values.max()))
     yield f"{found.values.size} rows of {found.output}, {' to '.join(dict.fromkeys(reach))}, {errors}"
+    yield f"compared with {found.output}: {models.load(model).output(found.output).long_name}"
     ranges = {
         name: f"{name} {' to '.join(dict.fromkeys(shown(float(end), units[name]) for end in (rows.min(), rows.max())))}"
         for name, rows in found.conditions.items()

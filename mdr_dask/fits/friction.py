@@ -214,9 +214,9 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
     known = bool(np.isfinite(ends[0]))
     if known:
         change += f" ({ends[0]:.2g}, {ends[1]:.2g})"
-    end = "still rises at the largest velocity" if max(ends, key=abs) > 0 else "already falls at the lowest velocity"
+    steepest = max(ends, key=abs) if known else rise
+    end = "still rises at the largest velocity" if steepest > 0 else "already falls at the lowest velocity"
     if abs(rise) > top.FLAT and not (known and ends[0] <= 0 <= ends[1]):
-        end = "still rises at the largest velocity" if rise > 0 else "already falls at the lowest velocity"
         return f"no: the plateau is not reached, friction {end}, {change}"
     if abs(rise) > top.FLAT or (known and max(map(abs, ends)) > top.FLAT):
         return f"not tested: because of the scatter, it is uncertain whether friction {end}, {change}"

@@ -38,7 +38,8 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 def _half_width(data: xr.Dataset) -> Any:
     """Return half the width of the contact of a smooth indenter at rest, in m."""
     coefficient, exponent = _body(data)
-    return shapes.half_width(data["normal_force"] / (4 * data["shear_modulus"]), coefficient, exponent)
+    load: Any = data["normal_force"] / (4 * data["shear_modulus"])
+    return shapes.half_width(load, coefficient, exponent)
 
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:

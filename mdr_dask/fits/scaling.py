@@ -25,6 +25,7 @@ from mdr_dask.fits.cases import (
     measure,
     one_value,
     power_law,
+    rms,
     stated_power,
     table_of,
 )
@@ -260,10 +261,11 @@ def _collapse(data: xr.Dataset) -> Variables:
         of_contact = collapse(x, bootstrap.difference(stack, slopes), curve, start, reference, vertical=False)
         stated = verdict(of_contact.residuals, count, of_contact.constants, where)
     before = collapse(x, stack[:1], np.zeros_like(curve), np.zeros(1), 0).residuals
-    rms, spread = (float(np.sqrt(np.mean(left[0] ** 2))) for left in (found.residuals, before))
     return {
-        **measure("rms_error", rms, "rms relative distance of the points from the common curve"),
-        **measure("rms_before", spread, "rms relative distance of the points from a common curve before shifting"),
+        **measure("rms_error", rms(found.residuals[0]), "rms relative distance of the points from the common curve"),
+        **measure(
+            "rms_before", rms(before[0]), "rms relative distance of the points from a common curve before shifting"
+        ),
         **measure("cases", int(used.size), "number of points of the shifted curves"),
         **_shifts(np.unique(force), loads, found, start - start[reference], count),
         **holds(stated, verdict(found.residuals, count, found.constants, where)),

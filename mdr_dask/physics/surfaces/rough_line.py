@@ -25,18 +25,10 @@ class RoughLine:
         """Number of Nyquist points."""
         return self.roughness.points
 
-    def heights(self, nodes: int) -> FloatArray:
-        """Return the roughness at equidistant nodes of one period."""
-        return self.roughness.heights(nodes)
-
-    def slopes(self, nodes: int) -> FloatArray:
-        """Return the derivative of the roughness with respect to x / L."""
-        return self.roughness.slopes(nodes)
-
     @cached_property
     def nodes(self) -> tuple[FloatArray, FloatArray]:
         """Heights and slopes of the roughness on a grid with twice as many nodes as Nyquist points."""
-        return self.heights(2 * self.points), self.slopes(2 * self.points)
+        return self.roughness.heights(2 * self.points), self.roughness.slopes(2 * self.points)
 
     def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:
         """Return the line of cubic cells through heights and slopes, or of straight cells if no slopes are given."""
@@ -44,11 +36,11 @@ class RoughLine:
 
     def cubic(self, nodes: int) -> CubicLine:
         """Return the line of cubic cells on a grid."""
-        return self.through(self.heights(nodes), self.slopes(nodes))
+        return self.through(self.roughness.heights(nodes), self.roughness.slopes(nodes))
 
     def straight(self, nodes: int) -> CubicLine:
         """Return the line of straight cells on a grid."""
-        return self.through(self.heights(nodes), None)
+        return self.through(self.roughness.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:
         """Return a periodic line that begins at its highest point; every grid then has a node at the highest point.
@@ -58,5 +50,5 @@ class RoughLine:
         if self.body is not None:
             return self
         nodes = SEEN * self.points
-        cell, place = highest_point(self.heights(nodes), self.slopes(nodes))
+        cell, place = highest_point(self.roughness.heights(nodes), self.roughness.slopes(nodes))
         return replace(self, roughness=self.roughness.from_place((cell + place) / nodes))

@@ -41,7 +41,7 @@ def test_nothing_that_lifts_off_counts_as_full_contact(terms, seed):
     line, deborah = _line(40, seed), np.array([1e-3])
     modulus = 1 + sum(g * 2j * np.pi * np.arange(1, 42) * t / (1 + 2j * np.pi * np.arange(1, 42) * t) for g, t in terms)
     wave = type(line.roughness)(line.roughness.coefficients * np.broadcast_to(modulus, 41), line.points)
-    least = -np.min(wave.heights(4096) + deborah * line.slopes(4096))
+    least = -np.min(wave.heights(4096) + deborah * line.roughness.slopes(4096))
     pairs = None if not terms else PronyTerms(*zip(*terms, strict=True))
     for share in (0.5, 0.999, 1.5, 2.5):
         steady, errors = problem.solve(line, pairs, deborah, np.array([share * least]), Request(accuracy=0.05))

@@ -21,7 +21,7 @@ def rough(realisation, points=64, hurst=0.7, body=None):
 
 
 def summit_curvature(line):
-    height, cell = line.heights(line.points * FINE), 1 / (line.points * FINE)
+    height, cell = line.roughness.heights(line.points * FINE), 1 / (line.points * FINE)
     top = int(np.argmax(height))
     before, at, after = height[[top - 1, top, (top + 1) % height.size]]
     return (2 * at - before - after) / cell**2
@@ -60,7 +60,7 @@ def glassy_limit(line, terms, load):
 
     In units of the line, with tau_m v / L = D_m: mu = sum(G_m / D_m) Var(u) / (G_inf <u>).
     """
-    height = line.heights(line.points * 256)
+    height = line.roughness.heights(line.points * 256)
     glass = 1 + sum(terms.moduli)
     # load = <u> in units of G_inf; the glassy foundation carries it above the remaining displacement u0
     shift = brentq(lambda p: np.mean(np.maximum(p + height, 0)) * glass - load, -height.max(), load + height.max())
