@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mdr_dask.physics.superposition.master_curve import Vertical
-    from mdr_dask.plots.base import Plot
 
 #: A campaign: the keys of a campaign file, or its path.
 Source = Mapping[str, Any] | str | Path | Campaign
@@ -296,21 +295,13 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     model = _model(groups)
     known = plots.available(model)
     if view or (figure not in known and any(figure in data.data_vars for data in groups.values())):
-        found = _of_output(groups, figure, **view)
+        from mdr_dask.plots.view import figure_of
+
+        found = figure_of(groups, figure, **view)
     else:
         found = _named(known, figure, f"figure of {model}")
     drawn: Figure = found.figure(selection.select_all(groups, _several(select)))
     return drawn
-
-
-def _of_output(
-    groups: Mapping[str, xr.Dataset], output: str, over: str | Sequence[str] | None = None, **view: Any
-) -> Plot:
-    from mdr_dask.plots.view import View, figure_of, main_axis
-
-    without = [view.get(name, "") for name in ("by", "panels")]
-    along = main_axis(groups, output, without) if over is None else _several(over)
-    return figure_of(View(output, along, **view))
 
 
 def master_curve(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,6 +86,7 @@ def plot(
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --over normal_force -o map.png
     mdr-dask plot results/rubber.zarr velocity --measured rig.csv -o rig.pdf
     """
+    from mdr_dask.errors import DataError, FitError
     from mdr_dask.plots import page
     from mdr_dask.plots.base import provenance
     from mdr_dask.questions import selection
@@ -103,48 +103,33 @@ def plot(
             return
         figures = _requested(names, everything, known, groups, axes)
         places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
-        _require_quantities(units, groups)
+        require_known([*units], [str(name) for data in groups.values() for name in data.variables], "quantity")
         groups = selection.select_all(groups, selections, tell)
         if where:
             groups = selection.where_all(groups, where)
         warnings = _warnings(urls)
-        figures = {name: _with_notes(figure, where, warnings) for name, figure in figures.items()}
         if measured is not None:
             from mdr_dask.plots.measured import with_points
 
             groups, figures = with_points(groups, figures, measured)
         for (name, figure), path in zip(figures.items(), places, strict=True):
             origin = provenance(name, urls, str(context.meta.get(COMMAND, "")))
-            notes[path.name] = _draw(figure, groups, path, origin, everything)
+            try:
+                description = figure.describe(groups)
+            except (DataError, FitError) as error:
+                if not everything:
+                    raise
+                tell(f"{name}: left out: {error}")
+                continue
+            description.warnings += warnings
+            description.leave_out([f"cases other than {where}"] * bool(where))
+            notes[path.name] = _save(description, path, origin)
+            click.echo(str(path))
     _tell_notes(notes)
     if warnings:
         tell(f"details of the warnings: mdr-dask status {urls[0]} --messages")
     if unused := units.keys() - asked.used:
         tell(f"--units {', '.join(sorted(unused))}: not shown in any figure that was drawn")
-
-
-def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Dataset]) -> None:
-    """Raise DataError if a unit is given for a name that is neither a parameter nor an output."""
-    from mdr_dask.errors import DataError, did_you_mean
-
-    known = sorted({str(name) for data in groups.values() for name in data.variables})
-    for name in units:
-        if name not in known:
-            raise DataError(
-                f"expected the name of a parameter or an output for a unit, got {name!r}{did_you_mean(name, known)}"
-            )
-
-
-def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
-    """Return a figure that states the condition `where` and `warnings`."""
-
-    def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-        drawn = figure.draw(groups)
-        drawn.warnings += warnings
-        drawn.leave_out([f"cases other than {where}"] * bool(where))
-        return drawn
-
-    return replace(figure, draw=draw)
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
@@ -229,7 +214,7 @@ def _requested(
 
 
 def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, Any]) -> Plot:
-    from mdr_dask.plots.view import View, figure_of, main_axis
+    from mdr_dask.plots.view import figure_of
 
     over = tuple(axis.replace(".", "_") for axis in axes["over"])
     if len(over) > 2 or (over and axes["effects"]):
@@ -238,49 +223,21 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
     if log is not None and log != "none" and not set(log) <= set("xyz"):
         raise click.UsageError(f"expected --log with letters of xyz, or 'none', got {log!r}")
     by, panels = (axes[key].replace(".", "_") for key in ("by", "panels"))
-    if not over and not axes["effects"]:
-        over = main_axis(groups, name, without=(by, panels))
-    return figure_of(View(name, over, by, panels, "" if log == "none" else log))
+    return figure_of(groups, name, over if over or axes["effects"] else None, by, panels, "" if log == "none" else log)
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store by name."""
+    """Return the groups of a store by their names in legends, which name the store if there are several stores."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
     groups = stores.datasets(url)
     groups = {name: selection.group(groups, name) for name in series} if series else groups
-    return {_name_of(url, urls, name): data for name, data in groups.items()}
-
-
-def _name_of(url: str, urls: Sequence[str], series: str) -> str:
-    """Return the name of a group in a legend: the series, after the name of the store if several stores are drawn."""
     if len(urls) == 1:
-        return series
+        return groups
     stems = [Path(each).stem for each in urls]
     store = Path(url).stem if stems.count(Path(url).stem) == 1 else url
-    return f"{store} {series}".strip()
-
-
-def _draw(
-    figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool
-) -> list[str]:
-    """Draw a figure and its table to files, and return notes that the picture does not show.
-
-    If it is one of several figures, an error is only printed.
-    """
-    from mdr_dask.errors import DataError, FitError
-
-    try:
-        description = figure.describe(groups)
-    except (DataError, FitError) as error:
-        if not one_of:
-            raise
-        tell(f"{figure.name}: left out: {error}")
-        return []
-    notes = _save(description, path, origin)
-    click.echo(str(path))
-    return notes
+    return {f"{store} {name}".strip(): data for name, data in groups.items()}
 
 
 def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:

@@ -32,7 +32,7 @@ def available(model: str) -> dict[str, Plot]:
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
     """Return the figures for the stores of a model, by name; for a model without own figures, one for each output."""
-    from mdr_dask.plots.view import View, figure_of, main_axis, varied
+    from mdr_dask.plots.view import figure_of, varied
 
     known = available(model)
     if any(plot.models for plot in known.values()):
@@ -40,4 +40,4 @@ def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
     outputs = {str(name): data for data in groups.values() for name in data.data_vars if name != "status"}
     drawn = [name for name, data in outputs.items() if set(data[name].dims) <= set(data["status"].dims)]
     drawn = [name for name in drawn if varied(outputs[name], name)]
-    return {name: figure_of(View(name, main_axis(groups, name))) for name in drawn} | known
+    return {name: figure_of(groups, name) for name in drawn} | known

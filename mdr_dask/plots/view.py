@@ -45,7 +45,7 @@ class View:
     """
 
     outputs: str | tuple[str, ...]
-    over: str | tuple[str, ...] = ()
+    over: str | Sequence[str] = ()
     by: str = ""
     panels: str = ""
     log: str | None = None
@@ -63,11 +63,11 @@ class View:
         """Names of the parameters on the axes."""
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
-    def is_log(self, which: str, values: Any) -> bool:
-        """Return whether an axis is logarithmic."""
+    def is_log(self, which: str, values: Any, how: labels.Quantity) -> bool:
+        """Return whether an axis is logarithmic; by default, an axis in degC is not."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
-        return labels.is_geometric(values) if self.log is None else which in self.log and positive
+        return not how.offset and labels.is_geometric(values) if self.log is None else which in self.log and positive
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
@@ -94,30 +94,43 @@ class _Part(NamedTuple):
     series: dict[str, xr.Dataset]
 
 
-def figure_of(view: View) -> Plot:
-    """Return the figure of a view, with the name of the first output."""
-    over = " and ".join(view.along) or "every parameter that varies"
-    summary = f"{view.names[0]} against {over}".replace("_", " ")
-    return Plot(view.names[0], (), summary, lambda groups: draw(groups, view))
+def figure_of(
+    groups: Mapping[str, xr.Dataset],
+    output: str,
+    over: str | Sequence[str] | None = None,
+    by: str = "",
+    panels: str = "",
+    log: str | None = None,
+) -> Plot:
+    """Return the figure of an output, by default against its `main_axis`; see `View` for the arguments."""
+    view = View(output, main_axis(groups, output, (by, panels)) if over is None else over, by, panels, log)
+    summary = f"{output} against {' and '.join(view.along) or 'every parameter that varies'}".replace("_", " ")
+    return Plot(output, (), summary, lambda groups: draw(groups, view))
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     """Draw the outputs of views, several outputs one above the other.
 
-    If nothing can be drawn, DataError gives the reason for each series.
+    A view that cannot be drawn is named below the figure, unless another view shows its output. If nothing can be
+    drawn, DataError gives the reason for each series.
     """
     figures, shown, reasons = [], [], []
+    missing: dict[str, list[str]] = {}
     for view, output in [(each, name) for each in views for name in each.names]:
         found, why = _holding(groups, view, output)
+        if not found:
+            missing.setdefault(output, []).extend(why)
+            continue
         reasons += why
-        if found and view.single:
+        if view.single:
             most = max(data.sizes.get("realisation", 1) for data in found.values())
             reasons += [f"realisations but the first of {most}"] * (most > 1)
             found = {name: data.isel(realisation=[0]) for name, data in found.items()}
-        if found:
-            form = {0: _effects, 1: _lines, 2: _map}[len(view.along)]
-            figures.append(form(found, view, output))
-            shown.append((view, output, found))
+        form = {0: _effects, 1: _lines, 2: _map}[len(view.along)]
+        figures.append(form(found, view, output))
+        shown.append((view, output, found))
+    drawn = {output for _, output, _ in shown}
+    reasons += [reason for output, why in missing.items() if output not in drawn for reason in why]
     if not figures:
         raise DataError("; ".join(dict.fromkeys(reasons)))
     whole = figures[0]
@@ -212,8 +225,7 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
         words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
         return Axis(label, ticks=[*enumerate(words)])
     every = np.concatenate([np.ravel(labels.shown(name, each)) for each in arrays])
-    has_zero = view.log is not None or not labels.quantity(name, first).offset
-    return Axis(label, log=view.is_log(which, every) and has_zero, quantity=name)
+    return Axis(label, log=view.is_log(which, every, labels.quantity(name, first)), quantity=name)
 
 
 # curves
@@ -227,9 +239,8 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     families = [_families(part.series, view, output) for part in parts]
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
-    log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
-    # by default, the axis of a temperature in degC is linear
-    log &= view.log is not None or not labels.quantity(output, first[output]).offset
+    values = np.concatenate([_values(panel) for panel in panels])
+    log = view.is_log("y", values, labels.quantity(output, first[output]))
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
         panel.y = y
@@ -444,7 +455,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
         raise DataError(f"expected an output that varies with a parameter, got {output}")
     how = labels.quantity(output, data[output])
     cases = how.of(aggregation.mean(data[output]))
-    y = Axis(labels.with_unit(how.symbol, how.unit), view.is_log("y", cases), quantity=output)
+    y = Axis(labels.with_unit(how.symbol, how.unit), view.is_log("y", cases, how), quantity=output)
     panels = []
     for name in names[:MOST_EFFECTS]:
         dim = curves.along_dim(data, name, output) or name

@@ -12,7 +12,7 @@ import xarray as xr
 from mdr_dask import aggregation
 from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
-from mdr_dask.report.words import markup, plain
+from mdr_dask.report.words import markup
 
 #: Largest number of cases of one series on the page.
 MOST_CASES = 4000
@@ -67,7 +67,7 @@ def main_outputs(data: xr.Dataset) -> list[str]:
 
 def _named(name: str, values: xr.DataArray) -> Json:
     label = labels.label(name, values)
-    return {"label": markup(label), "spoken": plain(label), "unit": labels.quantity(name, values).unit}
+    return {"label": markup(label), "spoken": labels.plain(label), "unit": labels.quantity(name, values).unit}
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:

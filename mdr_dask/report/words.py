@@ -3,33 +3,8 @@
 from __future__ import annotations
 
 import re
-from html import escape
+from html import escape, unescape
 
-#: Commands of mathtext that occur in labels of this package, and the characters that replace them.
-_CHARACTERS = {
-    "alpha": "α",
-    "beta": "β",
-    "gamma": "γ",
-    "delta": "δ",
-    "Delta": "Δ",
-    "eta": "η",
-    "lambda": "λ",
-    "mu": "μ",
-    "nu": "ν",
-    "pi": "π",
-    "rho": "ρ",
-    "sigma": "σ",
-    "tau": "τ",
-    "xi": "ξ",
-    "zeta": "ζ",
-    "nabla": "∇",
-    "infty": "∞",
-    "cdot": "·",
-    "times": "×",
-    "approx": "≈",
-    "pm": "±",
-    "sqrt": "√",
-}
 _INDEX = re.compile(r"([_^])(?:\{([^{}]*)\}|(.))")
 
 
@@ -41,17 +16,17 @@ def markup(label: str) -> str:
     return "".join(_formula(part) if k % 2 else escape(part) for k, part in enumerate(parts))
 
 
-def plain(label: str) -> str:
-    """Return a label without markup, for screen readers."""
-    return re.sub(r"</?su[bp]>", "", markup(label)).replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
-
-
 def _formula(text: str) -> str:
-    text = re.sub(r"\\([A-Za-z]+) ?", lambda found: _CHARACTERS.get(found[1], found[1]), text)
+    text = re.sub(r"\\([A-Za-z]+) ?", _character, text)
     text = escape(re.sub(r" *\\[,;!: ] *", " ", text))
     while (raised := _INDEX.sub(_placed, text)) != text:
         text = raised
     return text.replace("{", "").replace("}", "")
+
+
+def _character(command: re.Match[str]) -> str:
+    """Return the character for a command of mathtext that is also a name of HTML, such as alpha; else the name."""
+    return unescape(f"&{command[1]};").removeprefix("&").removesuffix(";")
 
 
 def _placed(found: re.Match[str]) -> str:

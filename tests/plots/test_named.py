@@ -43,7 +43,7 @@ FIGURES = {
         ROLLERS,
         ["friction_coefficient", "asperity_load_share", "contact_length", "breakthrough_probability", "film_ratio"],
     ),
-    "temperature": (ROLLERS, ["breakthrough_probability"] * 4),
+    "temperature": (ROLLERS, ["breakthrough_probability"]),
     "profiles": (PROFILES, ["upper_profile", "lower_profile"]),
     "trace": (PROFILES, ["contact_length_trace"] * 6),
     "film_profile": (FILM + "  inlet: [-4, -2]\n", ["pressure", "film"]),

@@ -33,7 +33,7 @@ def groups(tmp_path_factory):
 
 
 def described(groups, *arguments, **view):
-    return figure_of(View(*arguments, **view)).describe(groups)
+    return figure_of(groups, *arguments, **view).describe(groups)
 
 
 def rows(figure, what="data"):
@@ -130,7 +130,7 @@ def test_a_map_has_the_mean_of_every_case(groups):
 
 
 def test_effects_are_means_over_everything_else(groups):
-    figure = described(groups, MU)
+    figure = described(groups, MU, ())
     assert [panel.x.quantity for panel in figure.panels] == ["normal_force", "velocity", "hurst"]
     drawn = rows(figure, "mean")
     mean = aggregation.mean(groups[""][MU])
@@ -151,7 +151,7 @@ def test_a_sampled_study_is_drawn_as_points(tmp_path):
     assert [trace.kind for trace in figure.panels[0].traces] == ["dots"]
     assert "varying too: normal force" in [key.label for key in described(groups, MU, "velocity").panels[0].keys]
     assert {trace.kind for trace in described(groups, MU, ("velocity", "normal_force")).panels[0].traces} == {"dots"}
-    binned = rows(described(groups, MU), "mean")
+    binned = rows(described(groups, MU, ()), "mean")
     assert binned[binned.panel == 1].y.mean() == pytest.approx(float(mean.mean()))
 
 
@@ -201,7 +201,7 @@ def test_what_cannot_be_drawn_is_refused_with_the_reason(groups, view, message):
 
 
 def test_the_figure_and_its_table_are_written(groups, tmp_path):
-    drawn = figure_of(View(MU, "velocity", by="normal_force")).figure(groups)
+    drawn = figure_of(groups, MU, "velocity", "normal_force").figure(groups)
     drawn.save(tmp_path / "mu.svg")
     text = (tmp_path / "mu.csv").read_text()
     read = pd.read_csv(io.StringIO(text), comment="#")
