@@ -142,7 +142,6 @@ def power_law_series(
     exponent: float,
     lowest: float,
     highest: float,
-    terms_per_decade: int = 2,
 ) -> SeriesFit:
     """Return a Prony series for the law G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45).
 
@@ -155,8 +154,8 @@ def power_law_series(
     if not 0 < lowest < highest:
         raise ValueError(f"the range of frequency must be positive and not empty, got {(lowest, highest)!r}")
     decades = np.log10(highest / lowest)
-    times = np.geomspace(0.1 / highest, 10 / lowest, round((decades + 2) * terms_per_decade) + 1)
-    omega = np.geomspace(lowest, highest, int(np.ceil(10 * decades * terms_per_decade)) + 1)
+    times = np.geomspace(0.1 / highest, 10 / lowest, round((decades + 2) * 2) + 1)
+    omega = np.geomspace(lowest, highest, int(np.ceil(20 * decades)) + 1)
     wanted = loss_modulus * (omega / frequency) ** exponent
     moduli, _ = nnls(_loss_columns(omega, times) / wanted[:, None], np.ones_like(omega), maxiter=100 * times.size)
     solid = prony(static_modulus, moduli, times)

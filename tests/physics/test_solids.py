@@ -72,7 +72,7 @@ def test_power_law_series_refuses_what_is_no_power_law():
 
 
 def test_fitted_series_recovers_moduli_it_was_made_from():
-    made = power_law_series(1e6, 1e6, 1.0, 0.4, 1e-4, 1e7, 3).solid
+    made = power_law_series(1e6, 1e6, 1.0, 0.4, 1e-4, 1e7).solid
     omega = np.geomspace(1e-2, 1e5, 60)
     modulus = complex_modulus(made, omega)
     fit = fit_series(omega, modulus.real, modulus.imag, 2)

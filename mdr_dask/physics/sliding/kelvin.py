@@ -79,19 +79,6 @@ def barriers_for(cells: int) -> Barriers:
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
 
 
-class Places(NamedTuple):
-    """Positions along the line where each contact patch begins and ends, in cells."""
-
-    begins: FloatArray
-    ends: FloatArray
-
-
-@jit
-def places_for(patches: int) -> Places:
-    """Return empty arrays that hold the places of up to the given number of patches."""
-    return Places(np.empty(patches), np.empty(patches))
-
-
 @jit
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
@@ -278,14 +265,15 @@ def _skip_free(
 
 @jit
 def sweep_cells(
-    cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: Places
+    cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: FloatArray
 ) -> int:
     """Move one element once along the line; return the number of contact patches.
 
     The limits of a block that are still NaN are written to `barriers` when they are needed. The entries of `sums` are:
     the integral of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its
     derivative; the length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not
-    periodic is in contact, otherwise 0. `places` receives the ends of as many patches as its arrays can hold.
+    periodic is in contact, otherwise 0. `places`, shape (2, patches), receives the positions where the
+    first patches begin and end.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -298,7 +286,7 @@ def sweep_cells(
     )
     block_peak, block_mean, block_stretch = every.peak, every.mean, every.stretch
     barrier, block_barrier = barriers.cell, barriers.block
-    begins, ends = places.begins, places.ends
+    begins, ends = places[0], places[1]
     n, blocks, start = mean.size - 1, block_peak.size, cells.start
     decay, block_decay = np.exp(-1 / deborah), np.exp(-BLOCK / deborah)
     area = rate = drag = drag_rate = length = stretch = 0.0
@@ -392,9 +380,9 @@ def patches_at(
 ) -> tuple[FloatArray, FloatArray]:
     """Return two arrays: where each patch begins, and where each patch ends; arguments as in `sweep_cells`."""
     n = cells.mean.size - 1
-    places = places_for(n // 8 + 2)
+    places = np.empty((2, n // 8 + 2))
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)
-    if count > places.begins.size:
-        places = places_for(count)
+    if count > places.shape[1]:
+        places = np.empty((2, count))
         sweep_cells(cells, every, barriers, deborah, depth, sums, places)
-    return places.begins[:count], places.ends[:count]
+    return places[0, :count], places[1, :count]

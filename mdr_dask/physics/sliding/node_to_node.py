@@ -33,7 +33,6 @@ WING = 4  # a node of a finer grid is interpolated from this number of nodes on 
 BEFORE, AFTER = WING + 1, WING + 2  # `refine` needs these numbers of nodes before and after the period
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
-NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 # Rows of a tile (a part of a line on a finer grid): height and slope at each node, beginning with the node before the
@@ -45,7 +44,7 @@ IN_A_TILE = 5
 class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
-    `height` (relative to the first node), `slope` (rise per cell) and `ends` (from `ends_of`, or empty) begin with the
+    `height` (relative to the first node), `slope` (rise per cell) and `ends` (from `_ends_of`, or empty) begin with the
     last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. A row of
     `blocks` contains, for one block: upper bound of the height, height of the lowest node, smallest slope at a node,
     integral of the height, and integral of the squared slope. `top` is the height of the first node. `rise` is the
@@ -61,14 +60,7 @@ class Nodes(NamedTuple):
     rise: float
 
 
-@lru_cache(maxsize=4)
-def _end_factors(n: int) -> NDArray[np.complex128]:
-    """Return the factors of `ends_of` for the mean and for every wave of a line of n nodes."""
-    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
-    return np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
-
-
-def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
+def _ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     """Return corrections of the trapezium rule for the integrals of the height and of the squared slope, shape (2, n).
 
     The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
@@ -76,17 +68,17 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     important for the integrals over small contacts.
     """
     n = height.size
+    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
     parts = fft.rfft([height, (slope / n) ** 2])
-    parts *= _end_factors(n)
+    parts *= np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
     return np.asarray(fft.irfft(parts, n, overwrite_x=True), dtype=np.float64)
 
 
-def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
-    """Return a coarser line that consists of every stride-th node of a line, from node `first` on.
+def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int) -> Nodes:
+    """Return the line that consists of every stride-th node of a line with two nodes per Nyquist point.
 
-    Slopes are derivatives with respect to x / L. If `resolved` is False, the slopes of the coarser line are differences
-    of its heights, because its nodes are too far apart. `ends` contains the corrections of `ends_of`. If it is empty,
-    integrals over cells are computed from heights and slopes at neighbouring nodes.
+    The line begins at node `first`. Slopes are derivatives with respect to x / L. If there is less than one node per
+    Nyquist point, the slopes are differences of the heights, because the nodes are too far apart.
     """
     n = height.size // stride
 
@@ -96,18 +88,18 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         return np.concatenate([period[-BEFORE:], period, period[:AFTER]])
 
     h = periodic(height) - height[first]
-    if resolved:
+    if stride <= 2:
         s = periodic(slope) / n
     else:
         s = 0.5 * (np.roll(h, -1) - np.roll(h, 1))
         s[0], s[-1] = s[n], s[-1 - n]
-    terms = np.array([periodic(one) for one in ends]) if ends.size else ends
+    ends = np.array([periodic(one) for one in _ends_of(height, slope)]) if stride == 1 else np.empty((2, 0))
     cells = n // BLOCK * BLOCK
     mean, square = np.empty(cells), np.empty(cells + 1)
-    _integrals(h[BEFORE - 1 :], s[BEFORE - 1 :], terms[0, BEFORE - 1 :], terms[1, BEFORE - 1 :], cells, mean, square)
+    _integrals(h[BEFORE - 1 :], s[BEFORE - 1 :], ends[0, BEFORE - 1 :], ends[1, BEFORE - 1 :], cells, mean, square)
     blocks = np.empty((n // BLOCK, 5))
     _write_blocks(h[BEFORE:], s[BEFORE:], mean, square, blocks)
-    return Nodes(h, s, terms, blocks, float(height[first]), 0.0)
+    return Nodes(h, s, ends, blocks, float(height[first]), 0.0)
 
 
 @jit
@@ -138,7 +130,7 @@ def _integrals(
     """Write the integrals over each cell: of the height to `mean`, and of the squared slope to `square`.
 
     The input arrays begin one node before the first cell; `square` needs one entry more than there are cells. The
-    trapezium rule is corrected with the results of `ends_of`. If these are empty, the rule is corrected by the
+    trapezium rule is corrected with the results of `_ends_of`. If these are empty, the rule is corrected by the
     Euler-Maclaurin formula, with derivatives from heights and slopes at neighbouring nodes.
     """
     if of_height.size > 0:
@@ -622,8 +614,7 @@ class NodeToNode:
             return self._start()
         if level == 2:
             cell, _ = highest_point(self._height, self._slope)
-            ends, first = ends_of(self._height, self._slope), (cell + 1) % self._height.size
-            self._line = with_summit(nodes(self._height, self._slope, first, 1, True, ends))
+            self._line = with_summit(nodes(self._height, self._slope, (cell + 1) % self._height.size, 1))
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
         depths = np.where(depths > 0, depths, first_depths(some.loads))
@@ -641,7 +632,7 @@ class NodeToNode:
         highest = int(np.argmax(height))
         for stride in reversed(strides):
             results.fill(np.nan)
-            line = nodes(height, self._slope, highest, stride, stride == strides[0], NO_ENDS)
+            line = nodes(height, self._slope, highest, stride)
             _search(line, weights(1), self._cases, FIRST_STEP, FIRST_ERROR, depths, self._rates, results)
         self._depth = depths - line.top
         return self._solution(results, self._depth, 1)

@@ -26,10 +26,8 @@ from mdr_dask.physics.sliding.kelvin import (
     SUMS,
     Barriers,
     Blocks,
-    Places,
     barriers_for,
     blocks_of,
-    places_for,
     sweep_cells,
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
@@ -97,7 +95,7 @@ class _Swept(NamedTuple):
 
 @jit
 def _solve(
-    line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
+    line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: FloatArray
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
@@ -159,7 +157,7 @@ def _states(
     which is replaced by the trail of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
-    n, places = cells.mean.size - 1, places_for(0)
+    n, places = cells.mean.size - 1, np.empty((2, 0))
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     trail[:] = first
     for k in range(loads.size):
@@ -258,8 +256,7 @@ def _solved(
     status = np.full(loads.size, Outcome.INVALID, np.int8)
     if np.any(good):
         results[:, good], status[good] = solve(good, Cases(deborah[good] * n, loads[good] * n))
-    results[:, status != Outcome.CONVERGED] = np.nan
-    return Steady(results[0], results[1], results[2], results[3], status)
+    return Steady.of(results, status)
 
 
 def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:

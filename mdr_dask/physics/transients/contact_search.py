@@ -45,6 +45,7 @@ from mdr_dask.physics.transients.patches import (
     STIFFNESS,
     SUMS,
     TILT,
+    Cubic,
     Track,
     add_patch,
     force_at,
@@ -157,7 +158,7 @@ class Cell(NamedTuple):
     """
 
     i: int
-    line: tuple[float, float, float, float]
+    line: Cubic
     stop: float
     pressed: bool
     weak: bool
@@ -399,12 +400,12 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
     free elements arrive that have a larger displacement than the line, the second if the force falls to zero. If
     contact does not end in the cell, both flags are False.
     """
-    now, scan, recovery, (c0, c1, c2, c3) = search.now, search.work.scan, search.work.recovery, cell.line
+    now, scan, recovery = search.now, search.work.scan, search.work.recovery
     place = NONE
     if not cell.pressed:
         place = x - cell.i
-        if force_at(c0, c1, c2, c3, search.lift, now.deborah, place) > 0:
-            place = unloading(c0, c1, c2, c3, search.lift, now.deborah, place)
+        if force_at(cell.line, search.lift, now.deborah, place) > 0:
+            place = unloading(cell.line, search.lift, now.deborah, place)
     by_force = cell.i + place < cell.stop
     off = cell.i + place if by_force else cell.stop
     if cell.separated:
@@ -469,14 +470,14 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     positive force has just ended at x.
     """
     now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
-    i, lift, depth, (c0, c1, c2, c3) = cell.i, search.lift, search.depth, cell.line
+    i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
     low, high = x - i, NONE
     if not cell.pressed:
-        if ended or force_at(c0, c1, c2, c3, lift, now.deborah, low) <= 0:
-            low = loading(c0, c1, c2, c3, lift, now.deborah, low)
+        if ended or force_at(line, lift, now.deborah, low) <= 0:
+            low = loading(line, lift, now.deborah, low)
         if i + low >= cell.stop:
             return False, cell.stop
-        high = unloading(c0, c1, c2, c3, lift, now.deborah, low)
+        high = unloading(line, lift, now.deborah, low)
     by_force = i + high < cell.stop
     probe, peak = i + high if by_force else cell.stop, depth + now.track.peak[np.uintp(i)]
     if not (by_force or cell.weak) and peak <= scan[LOWEST]:

@@ -241,7 +241,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     If the displacement is at most `least`, both returned values may be 0.
     """
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
-    low = last_until(first.start, s, 0, first.count)
+    low = last_until(first.start, s, 0, first.start.size)
     if s <= first.end[low]:
         h, slope, _ = height_at(now.track, s)
         return (first.depth + h) * now.left, slope * now.left

@@ -63,7 +63,7 @@ class PreparedLine(NamedTuple):
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
-        return Patches(start, end, pressed, start.size, depth, deborah), sums
+        return Patches(start, end, pressed, depth, deborah), sums
 
 
 class SteadyLimits(NamedTuple):

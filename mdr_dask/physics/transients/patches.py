@@ -21,6 +21,8 @@ CLOSE = 1e-2  # largest last step towards a zero of the force, in cells; the err
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
+Cubic = tuple[float, float, float, float]  # coefficients of the height of the line in a cell, from the constant on
+
 
 class Track(NamedTuple):
     """The cells of a periodic line, with integrals up to every node.
@@ -55,7 +57,6 @@ class Patches(NamedTuple):
     start: FloatArray
     end: FloatArray
     pressed: FloatArray
-    count: int  # type: ignore[assignment]
     depth: float
     deborah: float
 
@@ -76,16 +77,13 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
     i = min(max(int(x), 0), track.enter.size - 1)
     y = x - i
     c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
-    return (
-        c0 + y * (c1 + y * (c2 + y * c3)),
-        c1 + y * (2 * c2 + y * 3 * c3),
-        2 * c2 + 6 * y * c3,
-    )
+    return c0 + y * (c1 + y * (c2 + y * c3)), c1 + y * (2 * c2 + y * 3 * c3), 2 * c2 + 6 * y * c3
 
 
 @jit_inline_uncounted
-def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, float, float]:
+def _part(line: Cubic, y: float) -> tuple[float, float, float]:
     """Return the height at y of a cubic on [0, 1], and the integrals of height and squared slope from 0 to y."""
+    c0, c1, c2, c3 = line
     height = c0 + y * (c1 + y * (c2 + y * c3))
     area = y * (c0 + y * (c1 / 2 + y * (c2 / 3 + y * c3 / 4)))
     square = y * c1 * c1 + y * y * (
@@ -99,15 +97,14 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
     """Add the exact load, drag, length and rise (integral of the slope) of a patch in contact to `sums`."""
     last = track.enter.size - 1
     i, j = min(int(start), last), min(int(end), last)
-    c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
-    h0, area0, square0 = _part(c0, c1, c2, c3, start - i)
+    line = cubic(track.height, track.enter, track.leave, i)
+    h0, area0, square0 = _part(line, start - i)
     if i == j:
-        h1, area1, square1 = _part(c0, c1, c2, c3, end - i)
+        h1, area1, square1 = _part(line, end - i)
         area, square = area1 - area0, square1 - square0
     else:
-        _, area_all, square_all = _part(c0, c1, c2, c3, 1.0)
-        c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, j)
-        h1, area1, square1 = _part(c0, c1, c2, c3, end - j)
+        _, area_all, square_all = _part(line, 1.0)
+        h1, area1, square1 = _part(cubic(track.height, track.enter, track.leave, j), end - j)
         area = area_all - area0 + (track.area[j] - track.area[i + 1]) + area1
         square = square_all - square0 + (track.square[j] - track.square[i + 1]) + square1
     rise = h1 - h0
@@ -149,20 +146,23 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
 
 
 @jit_inline_uncounted
-def unloading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
+def unloading(line: Cubic, lift: float, deborah: float, y: float) -> float:
     """Return the first place in a cell from y on where the force lift + h + deborah h' falls through 0, or `NONE`."""
+    c0, c1, c2, c3 = line
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
 @jit_inline_uncounted
-def loading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
+def loading(line: Cubic, lift: float, deborah: float, y: float) -> float:
     """Return the first place in a cell from y on where the force rises through 0, or `NONE`."""
+    c0, c1, c2, c3 = line
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
 
 @jit_inline_uncounted
-def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
+def force_at(line: Cubic, lift: float, deborah: float, y: float) -> float:
     """Return the force lift + h + deborah h' at y in a cell."""
+    c0, c1, c2, c3 = line
     return lift + c0 + y * (c1 + y * (c2 + y * c3)) + deborah * (c1 + y * (2 * c2 + y * 3 * c3))
 
 
@@ -186,7 +186,7 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)
-    for k in range(first.count):
+    for k in range(first.start.size):
         begin, end = first.start[k], first.end[k]
         x, pressed, entered = begin, False, True
         while x < end:
@@ -196,14 +196,10 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
                 whole = i % BLOCK == 0 and i + BLOCK <= min(int(end), n)
                 x = i + BLOCK if whole and barriers.block[i // BLOCK] < lift else stop
                 continue
-            c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
+            line = cubic(track.height, track.enter, track.leave, i)
             if entered:
-                pressed, entered = force_at(c0, c1, c2, c3, lift, deborah, x - i) > 0, False
-            change = (
-                unloading(c0, c1, c2, c3, lift, deborah, x - i)
-                if pressed
-                else loading(c0, c1, c2, c3, lift, deborah, x - i)
-            )
+                pressed, entered = force_at(line, lift, deborah, x - i) > 0, False
+            change = unloading(line, lift, deborah, x - i) if pressed else loading(line, lift, deborah, x - i)
             x = min(i + change, stop) if change < NONE else stop
             if x < stop and pressed:
                 add_patch(track, begin, x, lift, deborah, sums)

@@ -247,7 +247,8 @@ class _Relaxation(NamedTuple):
         reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
         onset = stepping.first / (stepping.growth - 1)
         marching = Marching(line.track, limits.first, reachable, self.deborah[1], self.load, *interval, onset)
-        return marching, found, workspace_for(limits.first.count, line.barriers(self.deborah[1]), bound - self.ends[0])
+        patches, barriers = limits.first.start.size, line.barriers(self.deborah[1])
+        return marching, found, workspace_for(patches, barriers, bound - self.ends[0])
 
 
 @jit
@@ -260,9 +261,9 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)
-    for k in range(slower.count):
+    for k in range(slower.start.size):
         first = int(slower.end[k]) + 1  # first node behind the patch
-        last = int(np.ceil(slower.start[k + 1])) - 1 if k + 1 < slower.count else cells
+        last = int(np.ceil(slower.start[k + 1])) - 1 if k + 1 < slower.start.size else cells
         free = slower.pressed[k] * np.exp(-(first - slower.end[k]) / slower.deborah)
         for i in range(first, last):
             free *= decay

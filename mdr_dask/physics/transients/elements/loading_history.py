@@ -111,7 +111,7 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
     if depth + line.height[:-1].max() <= 0:
         return 0.0
     n = state.displacement.size
-    good, last = _orbit(solid, line, deborah, depth, state, PERIODS)
+    good, last = _orbit(solid, line, deborah, depth, state)
     if not good:
         return np.nan
     step, modes = 1 / (n * deborah), np.empty(solid.rates.size)
@@ -121,9 +121,7 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
 
 
 @jit
-def _orbit(
-    solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, periods: int
-) -> tuple[bool, float]:
+def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State) -> tuple[bool, float]:
     """Move one element along the line at constant depth until its state repeats, and write the state of all elements.
 
     The number of nodes may be a multiple of the number of elements. Return whether the state repeats, and the
@@ -136,7 +134,7 @@ def _orbit(
     top = int(np.argmax(line.height[:n])) if line.periodic else 0
     u, free = max(depth + line.height[top], 0.0), 0.0
     touching = u > 0
-    for _ in range(periods if line.periodic else 1):
+    for _ in range(PERIODS if line.periodic else 1):
         last[:] = terms[0]
         before = u
         for cell in range(n):
