@@ -91,10 +91,12 @@ _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, after a space: the nearest known word.
+    """Return a hint with the nearest known word, or else with all known words if there are at most 12."""
+    return similar(word, known) or (f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else "")
 
-    Without a near word, the hint lists all known words, or is empty if there are more than 12.
-    """
+
+def similar(word: Any, known: Sequence[str]) -> str:
+    """Return a hint in parentheses, after a space, with the nearest known word; empty if no word is near."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}
@@ -107,6 +109,4 @@ def did_you_mean(word: Any, known: Sequence[str]) -> str:
     near = (synonyms if quantity == typed and synonyms else alike or synonyms) or [
         name for name in folded if len(typed) > 2 and typed in name
     ]
-    if near:
-        return f" (did you mean {folded[near[0]]!r}?)"
-    return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""
+    return f" (did you mean {folded[near[0]]!r}?)" if near else ""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from mdr_dask.errors import did_you_mean
+from mdr_dask.errors import similar
 from mdr_dask.units import conversion, is_unit
 
 #: Each line contains names of one quantity. The case of letters matters only in names of one letter.
@@ -20,6 +20,7 @@ frequency, f, freq, omega, w, ω, angular frequency, frequency angular, frequenz
 time, t, zeit
 velocity, v, speed, sliding velocity, sliding speed, load point velocity, geschwindigkeit, gleitgeschwindigkeit
 rotation speed, rotational speed, angular velocity, speed, n, drehzahl
+slide roll ratio, slide to roll ratio, srr
 storage modulus, e', g', storage, e storage, g storage, e stor, g stor, e1, g1, speichermodul
 loss modulus, e'', g'', loss, e loss, g loss, e2, g2, verlustmodul
 modulus, relaxation modulus, e relax, g relax, e(t), g(t), E, G
@@ -113,9 +114,8 @@ def is_called(heading: str, *names: str) -> bool:
 def nearest(heading: str, names: Sequence[str]) -> str:
     """Return a hint with a name that is similar to a heading or has a word in common with it, or an empty text."""
     words = {word for word in plain(heading).split() if len(word) > 2}
-    similar = did_you_mean(heading, names)
     common = [name for name in names if any(words & set(plain(each).split()) for each in _names_of(name))]
-    return similar if "mean" in similar else f" (did you mean {common[0]!r}?)" if common else ""
+    return similar(heading, names) or (f" (did you mean {common[0]!r}?)" if common else "")
 
 
 def split_unit(heading: str) -> tuple[str, str]:
@@ -136,19 +136,20 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
     """Return the column that a name means, or None, and its unit, which may be part of the name: ``v_mm_s``."""
     fitting = [column for column in columns if column.holds(name)]
     if fitting:
-        return next((column for column in fitting if _fits(unit, column)), fitting[0]), unit
+        return next((column for column in fitting if fits(unit, column)), fitting[0]), unit
     words = re.split(r"[\s_]", name)
     for count in range(len(words) - 1, 0, -1) if not unit else ():
         behind = [JOINED.get(word.casefold(), word) for word in words[count:]]
         for joined in (" ".join(behind), "/".join(behind)):
             for column in columns:
-                if column.holds(" ".join(words[:count])) and _fits(joined, column):
+                if column.holds(" ".join(words[:count])) and fits(joined, column):
                     return column, joined
     written = _BRACKETED.fullmatch(name)  # the unit in the brackets may be unknown
     return match(written[1], written[3], columns) if written and not unit else (None, unit)
 
 
-def _fits(unit: str, column: Column) -> bool:
+def fits(unit: str, column: Column) -> bool:
+    """Return whether a unit is given and has the dimension of a column."""
     try:
         factors(unit, column.unit)
     except ValueError:

@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.headings import Column, factors, is_called, match, nearest, plain, split_unit
+from mdr_dask.headings import Column, factors, fits, is_called, match, nearest, plain, split_unit
 from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
 
 COMMENT = "#%"
@@ -35,8 +36,14 @@ NO_ROWS = "expected a line of names and at least one line of values"
 
 #: A name of common logarithms: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
-_NUMBER = re.compile(r"(?=.{1,60}\Z)[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?")
+#: Marks between thousands, beside the point or comma that is not the decimal mark.
+_GROUPS = "'\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"
+#: Patterns of a number, indexed by its decimal mark; the other mark may separate thousands.
+_DECIMALS = {
+    mark: rf"[+-]?(?:(?:\d+|[1-9]\d{{0,2}}(?:[{other}{_GROUPS}]\d{{3}})+)(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eE][+-]?\d+)?"
+    for mark, other in (".,", ",.")
+}
+_NUMBER = re.compile(rf"(?=.{{1,60}}\Z)(?:{_DECIMALS['.']}|{_DECIMALS[',']})")
 _TEMPERATURE = r"([+-]?\d+(?:[.,]\d+)?)\s*(°\s?[CF]|deg[CF]|K)\b"
 _STATED = re.compile(rf"(?<![a-z])t(?:emp[a-z]*)?\.?\s*[=:]?\s*{_TEMPERATURE}", re.IGNORECASE)
 _MISSING = re.compile(
@@ -115,12 +122,14 @@ class Sheet:
 class Read(dict[str, FloatArray]):
     """The columns that were read from a table, by `Column.name`, in SI.
 
-    `headings` are the names as written. `remark` names the columns and lines of the table that were not used.
+    `headings` are the names as written. `remark` names the columns and lines of the table that were not used. `unused`
+    are units and numbers, as written, of the columns that were not used, by name.
     """
 
     headings: Mapping[str, str] = {}
     lines: tuple[Line, ...] = ()
     remark: str = ""
+    unused: Mapping[str, tuple[str, FloatArray]] = {}
 
 
 def is_table(path: str | Path) -> bool:
@@ -152,7 +161,7 @@ def _workbook(content: bytes, source: str) -> str:
     import pandas as pd
 
     try:
-        sheets = pd.read_excel(io.BytesIO(content), sheet_name=None, header=None, dtype=str, engine="openpyxl")
+        sheets = pd.read_excel(io.BytesIO(content), sheet_name=None, header=None, dtype=object, engine="openpyxl")
     except ImportError:
         raise DataError(
             f"{source}: reading Excel workbooks needs openpyxl: pip install openpyxl, or save the sheet as 'CSV UTF-8'"
@@ -161,9 +170,16 @@ def _workbook(content: bytes, source: str) -> str:
         raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None
     lines = []
     for name, sheet in sheets.items():
-        frame = sheet.fillna("").replace(r"[\t\r\n]+", " ", regex=True)
+        frame = sheet.fillna("").map(_of_workbook)
         lines += [SHEET + str(name), *("\t".join(row) for row in frame.to_numpy())]
     return "\n".join(lines)
+
+
+def _of_workbook(cell: object) -> str:
+    """Return a cell as text on one line. A text such as ``30,0`` gets a decimal point, as the numbers of a workbook."""
+    text = " ".join(str(cell).split())
+    is_decimal = re.fullmatch(_DECIMALS[","], text) and not re.fullmatch(_DECIMALS["."], text)
+    return text.replace(".", "").replace(",", ".") if isinstance(cell, str) and is_decimal else text
 
 
 def _lines(text: str) -> list[Line]:
@@ -225,6 +241,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     names, units = _names_and_units(grid, head)
     _require_even(grid, rows, len(units), head)
     cells = _with_points(grid, rows)[:, : len(units)]
+    if _ends_with_mean(cells, grid.number[rows]):
+        cells, (*rows, last) = cells[:-1], rows
+        notes = (f"{grid.lines[last]}: the mean of the rows above", *notes)
     first = grid.lines[rows[0] if head.names is None else head.names]
     sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, notes)
     known = [plain(name) for name in names]
@@ -276,12 +295,12 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
     lines = [line._replace(separator=separator) for line in texts]
     rows = [_split(line.text, separator) for line in lines]
     has_names = not any(map(_NUMBER.fullmatch, rows[0])) and not _are_units(rows[0])
-    for comment in [] if has_names else every[: every.index(texts[0])][-1:]:
-        for each in SEPARATORS:
-            names = _split(comment.text.lstrip(COMMENT + " "), each)
-            if len(names) == len(rows[0]) > 1 and not any(map(_NUMBER.fullmatch, names)):
-                rows, lines = [names, *rows], [comment._replace(separator=each), *lines]
-                break
+    for comment in [] if has_names else reversed(every[: every.index(texts[0])]):
+        cells = ((each, _split(comment.text.lstrip(COMMENT + " "), each)) for each in SEPARATORS)
+        fitting = [(each, names) for each, names in cells if len(names) == len(rows[0]) > 1]
+        if not fitting or any(map(_NUMBER.fullmatch, fitting[0][1])):
+            break
+        rows, lines = [fitting[0][1], *rows], [comment._replace(separator=fitting[0][0]), *lines]
     width = 1 + max((place for row in rows for place, cell in enumerate(row) if cell), default=0)
     cells = np.array([[*row[:width], *[""] * (width - len(row))] for row in rows], dtype=object)
     number = np.array([[bool(_NUMBER.fullmatch(cell)) for cell in row] for row in cells])
@@ -430,20 +449,37 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
 
 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
-    """Return the cells of lines with decimal points instead of commas; raise TableError if the lines contain both."""
+    """Return the cells of lines with decimal points and without marks between thousands.
+
+    All numbers must have one decimal mark; otherwise TableError is raised.
+    """
     cells = grid.cells[rows]
     places = [(row, column) for row, column in np.argwhere(grid.number[rows])]
-    commas, points = ([place for place in places if mark in cells[place]] for mark in ",.")
-    if commas and points:
-        (row, column), comma = points[0], commas[0]
+    of_marks = {mark: [place for place in places if mark in cells[place]] for mark in _DECIMALS}
+    possible = [mark for mark, form in _DECIMALS.items() if all(re.fullmatch(form, cells[place]) for place in places)]
+    if not possible or (len(possible) == 2 and all(of_marks.values())):
+        point, comma = of_marks["."][0], of_marks[","][0]
         what = (
-            f"expected decimal commas or decimal points, got both ({cells[points[0]]!r}, and {cells[comma]!r} in "
-            f"{grid.lines[rows[comma[0]]]}): remove the separators of thousands, and write one kind of decimals"
+            f"expected decimal commas or decimal points, got both ({cells[point]!r}, and {cells[comma]!r} in "
+            f"{grid.lines[rows[comma[0]]]}): write one kind of decimals"
         )
-        grid.require([rows[row]], column, what)
-    for place in commas:
-        cells[place] = cells[place].replace(",", ".")
+        grid.require([rows[point[0]]], point[1], what)
+    decimal = max(possible, key=lambda mark: len(of_marks[mark]))
+    for place in places:
+        cells[place] = re.sub(rf"[.,{_GROUPS}]", lambda mark: "." if mark[0] == decimal else "", cells[place])
     return cells
+
+
+def _ends_with_mean(cells: Cells, number: BoolArray) -> bool:
+    """Return whether the last row has the mean of the rows above in all columns, of which two or more vary."""
+    varied = 0
+    for column in np.flatnonzero(number[-1, : cells.shape[1]]) if len(cells) > 2 else ():
+        text, above = cells[-1, column], cells[:-1, column][number[:-1, column]].astype(np.float64)
+        last_digit = float(f"1e{Decimal(text).as_tuple().exponent}")
+        if not (above.size and np.isclose(float(text), above.mean(), rtol=1e-12, atol=last_digit / 2)):
+            return False
+        varied += above.min() < above.max()
+    return varied > 1
 
 
 def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
@@ -478,7 +514,8 @@ def _are_units(row: Sequence[str]) -> bool:
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
     """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
 
-    The meaning is one of `columns`, or None. A table without names has these `columns` in this order.
+    The meaning is one of `columns`, or None. A table without names has these `columns` in this order. A needed column
+    may have any name if it is the only one of its dimension, both in the table and among the `columns`.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -495,6 +532,12 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
             column, written = match(inner, unit or own, columns)
         is_logarithm = column is not None and logarithm is not None and not column.holds(name)
         found.append((column, written, is_logarithm))
+    missing = [column for column in columns if column.needed and column not in [meant for meant, _, _ in found]]
+    for column in missing:
+        places = [place for place, (_, unit, _) in enumerate(found) if fits(unit, column)]
+        alike = [each for each in columns if fits(each.unit, column)]
+        if column.unit != "1" and alike == [column] and len(places) == 1:
+            found[places[0]] = column, found[places[0]][1], False
     return found
 
 
@@ -538,7 +581,16 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     if problems:
         raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
     unused = [name for _, name in unknown if name]
-    read.remark = "; ".join(filter(None, (f"not used: {', '.join(unused)}" if unused else "", sheet.remark)))
+    by_unit = [
+        f"{name!r} is taken as {column.name}, because of its unit"
+        for name, (column, unit, is_logarithm) in zip(sheet.names, meanings, strict=False)
+        if column and not is_logarithm and match(name, unit, columns)[0] is not column
+    ]
+    parts = (*by_unit, f"not used: {', '.join(unused)}" if unused else "", sheet.remark)
+    read.remark = "; ".join(filter(None, parts))
+    read.unused = {
+        sheet.names[place]: (sheet.units[place], _values_or_nan(sheet.cells[:, place])) for place, _ in unknown
+    }
     read.lines = sheet.lines
     read.headings = {name: sheet.names[place] if sheet.names else "" for name, place in taken.items()}
     return read
@@ -575,8 +627,7 @@ def _values(
         if allow_missing and not re.search(r"\d", text):
             continue
         if not _NUMBER.fullmatch(text):
-            hint = " (remove the separators of thousands)" if _THOUSANDS.fullmatch(text) else ""
-            hint = " (write errors in a column of their own)" if re.search("±|[+][/-]", text) else hint
+            hint = " (write errors in a column of their own)" if re.search("±|[+][/-]", text) else ""
             hint = (
                 " (write units in the line of names)"
                 if re.fullmatch(r"[+-]?[\d.,]+ ?[^\W\d]\S*|.*\d ?%", text)
@@ -600,9 +651,14 @@ def _values(
     return values, problems
 
 
+def _values_or_nan(cells: Cells) -> FloatArray:
+    """Return cells as numbers; a cell that is not a number becomes NaN."""
+    return np.array([float(text) if _NUMBER.fullmatch(text) else math.nan for text in cells.flat]).reshape(cells.shape)
+
+
 def numbers(sheet: Sheet) -> FloatArray:
     """Return the entries of a table as numbers; entries without a digit and columns of words are NaN."""
-    values = np.array([[float(text) if _NUMBER.fullmatch(text) else math.nan for text in row] for row in sheet.cells])
+    values = _values_or_nan(sheet.cells)
     is_numeric = ~np.all(np.isnan(values), axis=0)
     wrong = [
         (row, place)

@@ -11,7 +11,7 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from mdr_dask.errors import did_you_mean, distinguishable
+from mdr_dask.errors import distinguishable, similar
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -68,6 +68,7 @@ tonne = 1e6 * gram = t
 newton = kilogram * meter / second ** 2 = N
 kilogram_force = 9.80665 * newton = kgf
 pound_force = 4.4482216152605 * newton = lbf
+newton_meter = newton * meter = Nm
 pascal = newton / meter ** 2 = Pa
 pascal_second = pascal * second = Pas
 bar = 1e5 * pascal
@@ -125,7 +126,7 @@ _DEGREES = re.compile(r"(?:(?i:deg(?:rees?)?\.?|°)\s*([CFcf])|([CF]))")
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
 #: Patterns of a number with a decimal comma, of a number whose comma may separate thousands, and of several numbers.
 _COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*([eE][+-]?\d+)?\s*[^\d,]*\Z")
-_THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}\s*[^\d,]*")
 _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
 
@@ -375,5 +376,5 @@ def _nearest(word: str, unit: str = "") -> str:
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"
-    hint = did_you_mean(word, [each for each in common if dimension_of(each) == dimension_of(unit)] if unit else common)
-    return hint if "mean" in hint else f", expected {expected(unit)}" if unit else ""
+    known = [each for each in common if not unit or dimension_of(each) == dimension_of(unit)]
+    return similar(word, known) or (f", expected {expected(unit)}" if unit else "")

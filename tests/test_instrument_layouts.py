@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pandas as pd
 import pytest
-from instrument_layouts import DMA, READ, REFUSED, TRIOS
+from instrument_layouts import DMA, FRICTION, READ, REFUSED, TRIOS
 
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
@@ -59,6 +59,12 @@ def test_lines_below_the_numbers_are_named():
     assert read.remark == "lines below the numbers, left out: '* limit', 'Mean', 'end of measurement'"
 
 
+def test_a_mean_without_a_label_is_left_out_and_named():
+    read = read_table("v [mm/s];mu\n1,0;0,5\n4,0;0,62\n\n2,5;0,56\n", "v.csv", FRICTION)
+    assert read["velocity"].tolist() == [1e-3, 4e-3]
+    assert "'line 5: the mean of the rows above'" in read.remark
+
+
 def test_pairs_of_columns_become_a_table_with_a_temperature():
     text, columns, _ = READ["digitised pairs"]
     read = read_table(text, "pairs.csv", columns)
@@ -82,7 +88,7 @@ def test_workbooks_are_read_sheet_by_sheet():
                 ["f", "E'", "T"],
                 ["Hz", "MPa", "°C"],
                 [1, 5.5, celsius],
-                [2, 6.5, celsius],
+                [2, "6,5", celsius],
             ]
             pd.DataFrame(rows).to_excel(writer, sheet_name=f"{celsius} C", header=False, index=False)
     read = read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", DMA)

@@ -67,6 +67,16 @@ def test_a_mistake_is_a_sentence_that_says_where_it_is_and_what_to_do(case):
     assert any(all(part in sentence for part in parts) for sentence in sentences), sentences
 
 
+def test_numbers_without_units_are_asked_about_beside_other_problems():
+    text = CAMPAIGN.replace("0.5 um", "0.5").replace("hurst: 0.7", "hurst: 7").replace("accuracy: 1 %", "outputs: [mu]")
+    with pytest.raises(CampaignError) as caught:
+        loads(text, "study.yaml", ".")
+    first, second, question = caught.value.args
+    assert first.startswith("study.yaml:8:10: parameters.hurst: expected")
+    assert second.startswith("study.yaml:14:11: outputs[0]: unknown output")
+    assert question.startswith("study.yaml:9:18: parameters.rms_roughness: 0.5 is read as 0.5 m: write '0.5 um'")
+
+
 QUOTED = ("seed: 1", "realisations: 2", "points: 500", "hurst: 0.7")
 COUNT = "1 m/s, 4]"
 

@@ -13,7 +13,7 @@ import xarray as xr
 from planted import SLIDING, make
 
 import mdr_dask
-from mdr_dask import bars, studies
+from mdr_dask import bars, models, studies
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, DataError, StoreError
 
@@ -153,6 +153,8 @@ def test_check_prints_what_the_command_prints(tmp_path, monkeypatch, capsys):
 REFUSED = [
     (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key (did"),
     (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
+    (lambda: mdr_dask.run({"model": models.load("ehl_line")}), CampaignError, "model: expected numbers, texts"),
+    (lambda: mdr_dask.run({"model": "json:loads", "parameters": {}}), CampaignError, "(see docs/own-model.md)"),
     (lambda: mdr_dask.open("nowhere.zarr"), StoreError, "nowhere.zarr: no store here"),
 ]
 

@@ -75,8 +75,8 @@ WRONG = {
     "unit of another kind": ("f [Hz],E' [mm]\n1,2\n", "1:8: $expected a pressure (such as '10 MPa')"),
     "dimension on a number": ("f [Hz],E' [Pa],tan delta [MPa]\n1,2,3\n", "1:16: column tan delta: expected a number"),
     "unknown column": (
-        "f [Hz],storage modulos [Pa]\n1,2\n",
-        "1:8: unknown column 'storage modulos' (did you mean 'storage modulus'?)",
+        "f [Hz],E' [Pa],tan delda\n1,2,3\n",
+        "1:16: unknown column 'tan delda' (did you mean 'tan delta'?)",
     ),
     "missing column": ("f [Hz],torque [N]\n1,5\n", "1:1: expected a column storage modulus, got torque"),
     "twice": (
@@ -118,6 +118,11 @@ def test_each_column_has_one_message():
     frequency, modulus = str(caught.value).splitlines()
     assert frequency.startswith("a.csv:2:1: column frequency: expected a value above 0, got '-1 Hz'")
     assert modulus.endswith("expected a number, got 'x' (and in 19 more lines)")
+
+
+def test_columns_that_resemble_nothing_are_not_used():
+    optional = [Column("velocity", "m/s"), Column("mean_velocity", "m/s", needed=False)]
+    assert read_table("velocity [m/s];Torque\n1;2\n", "a.csv", optional).remark == "not used: Torque"
 
 
 def test_empty_entries_may_be_allowed():

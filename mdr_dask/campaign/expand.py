@@ -47,9 +47,9 @@ def expand(
         series = expansion.series(name, model, outputs)
         if series is not None:
             found.append(series)
-            units = model.units(series.parameters)
-            asked |= dict.fromkeys(expansion.remarks)
-            asked |= dict.fromkeys(questions(document, model.parameters, expansion.data, paths, units))
+        units = model.units(series.parameters) if series else {}
+        asked |= dict.fromkeys(expansion.remarks)
+        asked |= dict.fromkeys(questions(document, model.parameters, expansion.data, paths, units))
     return tuple(found), tuple(asked)
 
 

@@ -6,6 +6,8 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Number
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from mdr_dask.campaign.definition import Campaign, tidy
 from mdr_dask.campaign.read import loads
 from mdr_dask.errors import CampaignError
+from mdr_dask.models.base import Model
 
 
 def of_keys(source: Mapping[str, Any]) -> Campaign:
@@ -21,9 +24,9 @@ def of_keys(source: Mapping[str, Any]) -> Campaign:
     Values may also be arrays and numbers of numpy, pandas or xarray, ranges of Python, paths, or quantities of pint.
     Numbers of numpy are rounded to 14 digits, so that ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
     """
-    text = json.dumps({"name": "study", **{str(key): _plain(value) for key, value in source.items()}}, indent=1)
+    keys = {str(key): _written(str(key), value) for key, value in source.items()}
     try:
-        found = loads(text, "campaign", ".")
+        found = loads(json.dumps({"name": "study", **keys}, indent=1), "campaign", ".")
     except CampaignError as error:
         raise CampaignError(*_without_lines(error.args)) from None
     return replace(found, remarks=_without_lines(found.remarks))
@@ -31,6 +34,13 @@ def of_keys(source: Mapping[str, Any]) -> Campaign:
 
 def _without_lines(messages: Sequence[str]) -> tuple[str, ...]:
     return tuple(re.sub(r"^campaign:\d+:\d+: ", "", message) for message in messages)
+
+
+def _written(key: str, value: Any) -> Any:
+    try:
+        return _plain(value)
+    except TypeError as error:
+        raise CampaignError(f"{key}: expected numbers, texts, lists and mappings, got {error}") from None
 
 
 def _plain(value: Any) -> Any:
@@ -49,7 +59,14 @@ def _plain(value: Any) -> Any:
     array = value if isinstance(value, np.ndarray) else getattr(value, "values", None)
     if isinstance(array, np.ndarray):
         return [_plain(inner) for inner in array] if array.ndim else _plain(array[()])
-    return value if value is None or isinstance(value, str | bool | int | float) else str(value)
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    if isinstance(value, Number | PurePath):
+        return str(value)
+    hint = (
+        " (write its name, module:NAME; see docs/own-model.md)" if isinstance(value, Model) or callable(value) else ""
+    )
+    raise TypeError(f"{type(value).__name__}{hint}")
 
 
 def _quantity(magnitude: Any, unit: str) -> Any:

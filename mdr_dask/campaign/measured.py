@@ -7,15 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel
+from numpy.typing import ArrayLike
 
 from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, distinguishable
-from mdr_dask.headings import Column, match, nearest, plain
+from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.numbers import numbers_of
-from mdr_dask.tables import Line, Sheet, read_sheet, read_table
+from mdr_dask.tables import Line, Read, Sheet, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
@@ -51,29 +51,37 @@ class Measured:
 
 
 def read_measured(
-    text: str, source: str, conditions: Mapping[str, str], outputs: Mapping[str, str], structures: Iterable[str] = ()
+    text: str,
+    source: str,
+    conditions: Mapping[str, str],
+    outputs: Mapping[str, str],
+    axes: Mapping[str, ArrayLike] | None = None,
 ) -> Measured:
-    """Read a table of measured points. `conditions` and `outputs` are SI units of the columns that it may contain.
+    """Read a table of measured points. `conditions` and `outputs` are SI units of the columns that it may have.
 
-    `structures` are names of nested parameter sets, such as ``solid``. If only one of them has a parameter
-    ``temperature``, the table may call its column ``temperature`` instead of ``solid_temperature``.
+    A column may have the last words of a name: ``temperature`` means ``solid_temperature`` if no shorter name has it.
+    An axis without a column is an unknown, so a column that is not used must not look like one of the `axes`.
     """
     sheet = read_sheet(text, source)
+    short = _short_names([*conditions, *outputs])
     of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
     found = [name for name, column in of_outputs.items() if any(column.holds(name) for name in sheet.names)]
+    if not found:
+        of_outputs = {name: Column(name, unit, short[name]) for name, unit in outputs.items()}
+        found = [name for name, column in of_outputs.items() if any(column.holds(name) for name in sheet.names)]
     if len(found) != 1:
         hint = "" if found else next(filter(None, (nearest(name, [*outputs]) for name in sheet.names)), "")
         got = ", ".join(found or sheet.names) or "no names"
         wanted = f"a column with one output of the study ({', '.join(outputs)})"
         raise DataError(f"{source}: expected {wanted}, got {got}{hint}")
     output = found[0]
-    short = _short_names([*conditions, *outputs], structures)
-    columns = [Column(name, unit, tuple(short.get(name, ())), needed=False) for name, unit in conditions.items()]
+    columns = [Column(name, unit, short[name], needed=False) for name, unit in conditions.items()]
     columns.append(of_outputs[output])
     headings, unit, is_relative = _error_of(sheet, columns)
     unit_of_errors = "1" if is_relative else outputs[output]
     error = Column(ERROR, unit_of_errors, headings, needed=False, above=0.0, given_unit=unit)
     read = read_table(text, source, [*columns, error], allow_missing=True)
+    _require_names(read, source, conditions, axes or {})
     if is_relative and ERROR in read:
         read[ERROR] = read[ERROR] * np.abs(read[output])
     known = np.isfinite(np.array([*read.values()])).all(axis=0)
@@ -115,11 +123,30 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
     )
 
 
-def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
-    """Return the names of nested parameters without the name of their structure, if these short names are unique."""
-    short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
-    called = [*names, *(inner for _, inner in short)]
-    return {name: [inner] for name, inner in short if called.count(inner) == 1}
+def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return for each name the ends, such as ``temperature`` for ``solid_temperature``, that no shorter name has."""
+    words = [tuple(name.split("_")) for name in names]
+    found: dict[str, tuple[str, ...]] = {"_".join(each): () for each in words}
+    for end in {each[start:] for each in words for start in range(1, len(each))}:
+        having = sorted((each for each in words if each[-len(end) :] == end), key=len)
+        if len(having) == 1 or len(having[0]) < len(having[1]):
+            found["_".join(having[0])] += ("_".join(end),)
+    return found
+
+
+def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapping[str, ArrayLike]) -> None:
+    """Raise DataError for a column that is not used although its numbers lie within the range of an unknown axis."""
+    for axis in [name for name in axes if name not in read]:
+        ends = np.asarray(axes[axis], dtype=np.float64)
+        low, high = ends.min() - SAME * abs(ends.min()), ends.max() + SAME * abs(ends.max())
+        for heading, (unit, numbers) in read.unused.items():
+            if unit and not fits(unit, Column(axis, units[axis])):
+                continue
+            before, factor, zero = factors(unit, units[axis])
+            values = before * (numbers[np.isfinite(numbers)] * factor + zero)
+            if values.size and low <= values.min() and values.max() <= high:
+                what = f"column {heading!r} is not used, but may be {axis}, which would then be an unknown"
+                raise DataError(f"{source}: {what}: name the column {axis}, or delete it")
 
 
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
@@ -143,10 +170,10 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
     notes_found = []
     for series in campaign.series if table else ():
         assert table is not None
-        conditions, outputs, structures = _of_series(campaign.model, campaign.outputs, series)
+        conditions, outputs, axes = _of_series(campaign.model, campaign.outputs, series)
         before = f"measured {table.name}{f', series {series.name}' if series.name else ''}"
         try:
-            found = read_measured(table.read_text(), table.name, conditions, outputs, structures)
+            found = read_measured(table.read_text(), table.name, conditions, outputs, axes)
         except DataError:
             notes_found.append(f"{before}: no measured points belong to this series")
             continue
@@ -213,8 +240,10 @@ def _unknown(measured: Measured, series: Series) -> list[str]:
     return [axis.name for axis in series.axes if axis.unit is not None and axis.name not in measured.conditions]
 
 
-def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str], list[str]]:
-    """Return the units of conditions and outputs of a series, and the names of its nested parameter sets."""
+def _of_series(
+    name: str, outputs: Sequence[str], series: Series
+) -> tuple[dict[str, str], dict[str, str], dict[str, ArrayLike]]:
+    """Return the units of conditions and outputs of a series, and the values of its numerical axes."""
     model = models.load(name)
     special = model.units(series.parameters)
     conditions = {key: unit for key, (_, unit, _) in numbers_of(series.parameters).items()}
@@ -224,5 +253,5 @@ def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[
     return (
         {key: special.get(key, unit) for key, unit in conditions.items()},
         {key: special.get(key, unit) for key, unit in declared.items()},
-        [key for key, value in series.parameters if isinstance(value, BaseModel)],
+        {axis.name: axis.values for axis in series.axes if axis.unit is not None},
     )

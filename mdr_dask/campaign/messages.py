@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Path, shown
-from mdr_dask.errors import did_you_mean
+from mdr_dask.errors import did_you_mean, similar
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
@@ -121,8 +121,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
     types = {details["type"] for details in group}
     choices = [choice for details in group for choice in _choices(details)]
     if isinstance(value, str):
-        hint = did_you_mean(value, choices)
-        return hint if "mean" in hint else spelt(value) if types & {"int_type", "float_type"} else ""
+        return similar(value, choices) or (spelt(value) if types & {"int_type", "float_type"} else "")
     if isinstance(value, float) and value.is_integer() and types & {"int_type", "int_from_float"}:
         return f" (write {value:.0f})"
     if isinstance(value, dict) and types & {"float_type", "int_type"}:

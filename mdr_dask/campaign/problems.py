@@ -45,16 +45,19 @@ class Problems:
     def __bool__(self) -> bool:
         return bool(self._found)
 
+    def __contains__(self, place: Place) -> bool:
+        return any(place == each for each, _ in self._found)
+
     def add(self, place: Place, where: str, what: str) -> None:
         """Add a problem, unless there is already one for the same key at the same position."""
         self._found.setdefault((place, where), Problem(place, where, what))
 
-    def raise_if_any(self) -> None:
-        """Raise one `CampaignError` with all problems, sorted by file and line."""
+    def raise_if_any(self, questions: Iterable[str] = ()) -> None:
+        """Raise one `CampaignError` with all problems, sorted by file and line, and then the questions."""
         if self._found:
             sources = list(dict.fromkeys(place.source for place, _ in self._found))
             ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))
-            raise CampaignError(*map(str, ordered))
+            raise CampaignError(*map(str, ordered), *questions)
 
 
 def dotted(path: Iterable[str | int]) -> str:

@@ -57,7 +57,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
         except DataError as error:
             for line in str(error).splitlines():
                 document.report(("measured", "table"), line)
-    document.problems.raise_if_any()
+    document.problems.raise_if_any(remarks)
     return Campaign(
         name=spec.name,
         model=spec.model,
@@ -97,9 +97,14 @@ def _model(document: Document, spec: CampaignSpec) -> Model[Any] | None:
     try:
         return models.load(spec.model)
     except ModelError as error:
-        hint = did_you_mean(spec.model, models.names()) if str(error).startswith("unknown") else ""
-        document.report(("model",), f"{error}{hint}")
+        document.report(("model",), with_hint(error, spec.model))
     return None
+
+
+def with_hint(error: ModelError, name: str) -> str:
+    """Return the message about a model that cannot be loaded, with the nearest name or the page on own models."""
+    is_unknown = str(error).startswith("unknown")
+    return f"{error}{did_you_mean(name, models.names()) if is_unknown else ' (see docs/own-model.md)'}"
 
 
 def _outputs(document: Document, spec: CampaignSpec, model: Model[Any]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Place, Problems, dotted
 from mdr_dask.campaign.spec import Drawn, LatinHypercubeSpec, SaltelliSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import DataError, did_you_mean, similar
 from mdr_dask.models.base import Parameters
 from mdr_dask.tables import Line, Sheet, TableError, decoded, read_sheet
 
@@ -113,7 +113,7 @@ def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)
-    return not (has_numbers and "mean" in did_you_mean(heading, list(parameters.model_fields)))
+    return not (has_numbers and similar(heading, list(parameters.model_fields)))
 
 
 def _column(name: str, sheet: Sheet, index: int) -> Variation:

@@ -12,7 +12,7 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path
 from mdr_dask.campaign.spec import RefinedSpec, ToleranceSpec
-from mdr_dask.errors import did_you_mean
+from mdr_dask.errors import did_you_mean, similar
 from mdr_dask.models.base import Model
 from mdr_dask.units import to_si
 
@@ -43,7 +43,7 @@ def tolerances(
 
 def is_of_fit(name: str, model: Model[Any]) -> bool:
     """Return whether a name means a fitted constant, such as ``zone_one.alpha``, and is not a misspelt output."""
-    return "did you mean" not in did_you_mean(name, [output.name for output in model.outputs])
+    return not similar(name, [output.name for output in model.outputs])
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:

@@ -51,7 +51,7 @@ def questions(
                 continue
             unit = units.get(dotted(field), fields.unit_at(parameters, field, data) or "1")
             usual = fields.usual(found[0].model_fields[found[1]])
-            if usual and is_doubtful(value, unit, usual):
+            if usual and document.place(at) not in document.problems and is_doubtful(value, unit, usual):
                 asked.add(field)
                 yield str(Problem(document.place(at), dotted(at), _question(value, unit, usual)))
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from mdr_dask.cli.options import tell
-from mdr_dask.cli.printing import is_rounding, print_aligned, print_left, titled, with_error, with_interval
+from mdr_dask.cli.printing import print_aligned, print_left, titled, with_error, with_interval
 from mdr_dask.cli.writing import require_suffix, writing
 from mdr_dask.errors import DataError
 
@@ -105,7 +105,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean and its errors, ``0.1234 +- 0.0005``, or its interval, ``0.1234 (0.1220, 0.1240)``, in one column.
 
-    An error is left out if it is unknown or zero in all rows. The returned text names the errors that are printed.
+    An error is left out if it is unknown in all rows. The returned text names the errors that are printed.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}
@@ -118,7 +118,6 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
             ends = [f"{output}_{part}" for part in ("low", "high") if f"{output}_{part}" in columns]
             left_out |= {*errors, *ends}
             parts = [each for each in errors or ends if each in known]
-            parts = [each for each in parts if each in ends or not is_rounding(columns[each], values)]
             join = with_interval if ends else with_error
             joined[output] = [join(*each) for each in zip(values, *(columns[part] for part in parts), strict=True)]
             if errors and parts:

@@ -92,13 +92,13 @@ def _with_unit(row: dict[str, str]) -> str:
 def _model(name: str) -> Model[Any]:
     """Return a model; raise UsageError for an unknown name."""
     from mdr_dask import models
-    from mdr_dask.errors import ModelError, did_you_mean
+    from mdr_dask.campaign.read import with_hint
+    from mdr_dask.errors import ModelError
 
     try:
         return models.load(name)
     except ModelError as error:
-        hint = did_you_mean(name, models.names()) if str(error).startswith("unknown") else ""
-        raise click.UsageError(f"{error}{hint}") from None
+        raise click.UsageError(with_hint(error, name)) from None
 
 
 @click.command()

@@ -242,12 +242,6 @@ def with_error(mean: float, *errors: float | None) -> str:
     return " +- ".join([_number(mean, 4), *shown])
 
 
-def is_rounding(errors: Sequence[Any], means: Sequence[Any]) -> bool:
-    """Return whether all known errors of means are zero or rounding errors."""
-    pairs = [(error, mean) for error, mean in zip(errors, means, strict=True) if error is not None and mean is not None]
-    return not any(abs(error) > ROUNDING * abs(mean) for error, mean in pairs)
-
-
 def _error(error: float, size: float) -> str:
     return _number(error, 1) if error > ROUNDING * size else "0"
 

@@ -175,10 +175,9 @@ def list_names(summaries: dict[str, str]) -> None:
 
 def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
     """Raise UsageError for an unknown name, with the nearest known name."""
-    from mdr_dask.errors import did_you_mean
+    from mdr_dask.errors import similar
 
     for name in names:
         if name not in known:
-            hint = did_you_mean(name, known)
-            rest = hint if "mean" in hint else f"; known: {', '.join(known) or 'none'}"
-            raise click.UsageError(f"no {what} is called {name!r}{rest}")
+            hint = similar(name, known) or f"; known: {', '.join(known) or 'none'}"
+            raise click.UsageError(f"no {what} is called {name!r}{hint}")

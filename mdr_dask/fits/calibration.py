@@ -5,7 +5,6 @@ The unknowns are the axes of the study that are not columns of the table of meas
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -210,9 +209,8 @@ def measured_of(dataset: xr.Dataset) -> Measured:
         for name, axis in dataset.coords.items()
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
-    parameters = json.loads(dataset.attrs.get("parameters", "{}"))
-    structures = [key for key, value in parameters.items() if isinstance(value, dict)]
-    return read_measured(table["text"], table["name"], conditions, outputs, structures)
+    axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim}
+    return read_measured(table["text"], table["name"], conditions, outputs, axes)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import DataError, similar
 from mdr_dask.tables import decoded, described
 
 #: Size limit in bytes. Larger files get no note about their columns.
@@ -78,8 +78,8 @@ def _find_file(value: Any, info: ValidationInfo) -> Any:
     directory = info.context["directory"] if info.context else "."
     path = Path(directory, value).resolve()
     if not path.is_file():
-        hint = did_you_mean(path.name, [each.name for each in Path(directory).iterdir() if each.is_file()])
-        near = hint if "mean" in hint else " (names begin at the folder of the campaign file)"
+        near = similar(path.name, [each.name for each in Path(directory).iterdir() if each.is_file()])
+        near = near or " (names begin at the folder of the campaign file)"
         raise ValueError(f"no such file: {path}{near}")
     return DataFile.of(path).model_copy(update={"name": value})
 

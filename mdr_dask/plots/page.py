@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import DataError, similar
 from mdr_dask.units import to_si
 
 #: Sizes of letters and lines, in points, for a figure that is printed at its requested size, without scaling.
@@ -81,8 +81,7 @@ def drawing_for(page: Page) -> Iterator[None]:
 
     style = page.style
     if style is not None and not (Path(style).is_file() or style in library):
-        hint = did_you_mean(style, [*library])
-        near = hint if "mean" in hint else " (such as 'grayscale' or 'seaborn-v0_8-paper')"
+        near = similar(style, [*library]) or " (such as 'grayscale' or 'seaborn-v0_8-paper')"
         raise DataError(f"expected a style file, or the name of a style of matplotlib{near}, got {style!r}")
     given = {} if style is None else library.get(style) or rc_params_from_file(style, use_default_template=False)
     token = _PAGE.set(replace(page, cycle=tuple(given.get("axes.prop_cycle", ()))))

@@ -57,6 +57,16 @@ def test_rows_without_a_number_are_left_out_and_counted():
     assert "'end of test'" in found.remark
 
 
+@pytest.mark.parametrize("heading", ["Laod [N]", "Last / N", "Zyklen"])
+def test_columns_that_may_be_an_axis_are_not_left_out(heading):
+    """An axis without a column would be an unknown of the calibration."""
+    text = f"velocity [m/s];mu;{heading};F_t [N];room [degC];n\n1;0,3;2;700;20;30\n2;0,4;5;800;21;30\n"
+    axes = {"velocity": (1, 2), "normal_force": (1e-3, 6)}
+    with pytest.raises(DataError, match="is not used, but may be normal_force, which would then be an unknown: name"):
+        read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, axes)
+    assert read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2)}).remark.startswith("not used")
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
 def test_reports_of_a_rig_are_read_as_they_stand(encoding):
     text = "Rig \u2013 \u00b5 on A37\nT: 20 \u00b0C; 80 N\n"
