@@ -185,24 +185,15 @@ class _Expansion:
     ) -> list[list[Any] | None]:
         """Return the checked values of every varied parameter in all cases; only None if a case is wrong."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
-        cases = range(min((len(one.items) for one in variations), default=0))
-        sizes = [[item.value for item in one.items] for one in variations]
-        if all(
-            one.spread
-            and all(isinstance(value, int | float) for value in values)
-            and fields.is_independent(self.parameters, one.path, self.data)
-            for one, values in zip(variations, sizes, strict=True)
-        ):
-            extremes = {values.index(end(values)) for values in sizes for end in (min, max)}
-            good = [self._validate(known, variations, position, broken) is not None for position in extremes]
-            return [values if all(good) else None for values in sizes]
-        columns: list[list[Any]] = [[] for _ in variations]
-        for position in cases:
-            checked = self._validate(known, variations, position, broken)
-            for one, column in zip(variations, columns, strict=True):
-                if checked is not None:
-                    column.append(_get(checked, one.path))
-        return [column if len(column) == len(cases) else None for column in columns]
+        are_independent = all(fields.is_independent(self.parameters, one.path, self.data) for one in variations)
+        cases = list(zip(*(one.items for one in variations), strict=False))
+        rows: list[list[Any]] = []
+        for position, items in enumerate(cases):
+            if are_independent and all(item.inner for item in items):
+                rows.append([item.value for item in items])
+            elif checked := self._validate(known, variations, position, broken):
+                rows.append([_get(checked, one.path) for one in variations])
+        return [list(column) for column in zip(*rows, strict=True)] if len(rows) == len(cases) else [None]
 
     def _validate(
         self, data: Mapping[str, Any], variations: Sequence[Variation], position: int, broken: set[Path]

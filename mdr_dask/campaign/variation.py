@@ -35,7 +35,7 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written or in SI; `inner` is true between the ends of a range."""
+    """One value of a varied parameter, as written or in SI; `inner` is true between the smallest and the largest."""
 
     value: Any
     origin: Origin
@@ -64,7 +64,10 @@ class Variation:
     def drawn(self, shares: Any) -> Variation:
         """Return this variation with new values, which lie at the given fractions (0 to 1) of its interval."""
         assert self.spread is not None
-        return replace(self, items=tuple(Item(value, self.origin) for value in self.spread.at(shares)))
+        values = self.spread.at(shares)
+        ends = values.index(min(values)), values.index(max(values))
+        items = (Item(value, self.origin, inner=place not in ends) for place, value in enumerate(values))
+        return replace(self, items=tuple(items))
 
 
 def find(

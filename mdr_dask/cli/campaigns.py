@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.bars import at_work
-from mdr_dask.cli.printing import hanging, print_json, say, terminal_width
+from mdr_dask.cli.printing import print_json, print_named, say, terminal_width
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def models(name: str | None, form: str | None) -> None:
         if form == "json":
             print_json(rows)
         else:
-            _print_named([(row["model"], row["summary"]) for row in rows])
+            print_named([(row["model"], row["summary"]) for row in rows])
         return
     model = _model(name)
     parameters, outputs, numbers = parameter_rows(model), output_rows(model), number_rows(model)
@@ -47,22 +47,15 @@ def models(name: str | None, form: str | None) -> None:
         print_json({"model": name, **rest})
         return
     say(f"{name}: {model.summary}\n\nparameters")
-    _print_named([(_indented(row["parameter"]), _parameter(row)) for row in parameters])
+    print_named([(_indented(row["parameter"]), _parameter(row)) for row in parameters])
     if together:
         lines = (click.wrap_text(line, terminal_width(), subsequent_indent="    ") for line in together)
         click.echo("\n".join(["", "exactly one of these is required", *lines]))
     click.echo("\noutputs")
-    _print_named([(row["output"], _output(row)) for row in outputs])
+    print_named([(row["output"], _output(row)) for row in outputs])
     if numbers:
         click.echo("\ndimensionless numbers")
-        _print_named([(row["number"], f"{row['meaning']}; {row['formula']}") for row in numbers])
-
-
-def _print_named(entries: list[tuple[str, str]]) -> None:
-    """Print names in one column, each followed by its description."""
-    width = max(len(name) for name, _ in entries)
-    for name, text in entries:
-        click.echo(hanging(f"{name.ljust(width)}  ", text))
+        print_named([(row["number"], f"{row['meaning']}; {row['formula']}") for row in numbers])
 
 
 def _indented(path: str) -> str:

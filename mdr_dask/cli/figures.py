@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli.options import look_options, select_option, tell, units_option, where_option
-from mdr_dask.cli.printing import say
-from mdr_dask.cli.results import list_names, require_known
+from mdr_dask.cli.printing import print_named, say
+from mdr_dask.cli.results import require_known
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def _list(known: Mapping[str, Plot], groups: Mapping[str, xr.Dataset]) -> None:
     """Print the figures, the outputs and the axes of a study."""
     from mdr_dask.plots.view import varied
 
-    list_names({name: figure.summary for name, figure in known.items()})
+    print_named([(name, figure.summary) for name, figure in known.items()])
     errors = {array.attrs.get("ancillary_variables") for data in groups.values() for array in data.data_vars.values()}
     outputs = [name for name in _outputs_of(groups) if name not in errors]
     axes = dict.fromkeys(axis for data in groups.values() for axis in varied(data, "status"))

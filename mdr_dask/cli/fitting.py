@@ -17,8 +17,8 @@ from mdr_dask.cli.options import (
     series_option,
     tell,
 )
-from mdr_dask.cli.printing import print_aligned, print_rows, say, short, table, titled, with_intervals
-from mdr_dask.cli.results import list_names, require_known, store_argument
+from mdr_dask.cli.printing import print_aligned, print_named, print_rows, say, short, table, titled, with_intervals
+from mdr_dask.cli.results import require_known, store_argument
 from mdr_dask.cli.sensitivity import Asking
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def fit(
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
-        list_names({name: law.summary for name, law in known.items()})
+        print_named([(name, law.summary) for name, law in known.items()])
         return
     require_known(names, list(known), f"law for {model}")
     if (measured or figure) and names != ("calibration",):

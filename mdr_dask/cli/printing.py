@@ -114,9 +114,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
             _print_block(heads, cells, widths)
             return
     if len(cells[0]) == 1:
-        size = max(map(len, titles))
-        for title, column in zip(titles, cells, strict=True):
-            click.echo(hanging(f"{title.ljust(size)}  ", column[0]))
+        print_named([(title, column[0]) for title, column in zip(titles, cells, strict=True)])
         return
     for part in _parts(needed, keys):
         _print_block([heads[k] for k in part], [cells[k] for k in part], [widths[k] for k in part])
@@ -161,6 +159,13 @@ def hanging(before: str, text: str) -> str:
         return (before + text).rstrip()
     lines = textwrap.wrap(text, width, break_on_hyphens=False)
     return ("\n" + " " * len(before)).join([before + lines[0], *lines[1:]]).rstrip()
+
+
+def print_named(entries: Sequence[tuple[str, str]]) -> None:
+    """Print names in one column, each followed by its description."""
+    width = max((len(name) for name, _ in entries), default=0)
+    for name, text in entries:
+        click.echo(hanging(f"{name.ljust(width)}  ", text))
 
 
 def _heading(title: str, width: int) -> list[str]:

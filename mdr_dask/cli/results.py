@@ -14,7 +14,7 @@ from mdr_dask.cli.options import (
     question_options,
     tell,
 )
-from mdr_dask.cli.printing import hanging, print_json, print_rows, say
+from mdr_dask.cli.printing import print_json, print_rows, say
 from mdr_dask.cli.writing import writing
 
 
@@ -164,13 +164,6 @@ def _answer(
     answer = table(dataset, question, 0, tell)
     rows = write_answer(answer, output)
     click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
-
-
-def list_names(summaries: dict[str, str]) -> None:
-    """Print each name with one line of description."""
-    width = max(map(len, summaries), default=0)
-    for name, summary in summaries.items():
-        click.echo(hanging(f"{name.ljust(width)}  ", summary))
 
 
 def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:

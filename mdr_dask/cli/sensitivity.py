@@ -68,13 +68,9 @@ def sensitivity(
 
 
 def _sentences(attributes: dict[str, object]) -> list[str]:
-    left = attributes["left_out"]
-    return [
-        *([f"{left} of {attributes['cases']} cases without a value are left out"] if left else []),
-        *(
-            ["with one realisation, scatter between realisations counts as an interaction"]
-            if attributes["realisations"] == 1
-            else []
-        ),
-        str(attributes["advice"]),
-    ]
+    sentences = []
+    if attributes["left_out"]:
+        sentences.append(f"{attributes['left_out']} of {attributes['cases']} cases without a value are left out")
+    if attributes["realisations"] == 1:
+        sentences.append("with one realisation, scatter between realisations counts as an interaction")
+    return [*sentences, str(attributes["advice"])]
