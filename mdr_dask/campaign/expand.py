@@ -235,8 +235,7 @@ class _Expansion:
         return self.document.key_place(path) if key else self.document.place(path)
 
     def _axis(self, one: Variation, column: list[Any]) -> Axis:
-        found = fields.owner(self.parameters, one.path, self.data)
-        description = found[0].model_fields[found[1]].description if found else None
+        info = fields.field_at(self.parameters, one.path, self.data)
         name = "_".join(one.path)
         numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in column)
         return Axis(
@@ -246,7 +245,7 @@ class _Expansion:
             values=tuple(column),
             labels=None if numeric else tuple(item.label for item in one.items),
             unit=(fields.unit_at(self.parameters, one.path, self.data) or "1") if numeric else None,
-            long_name=description or name,
+            long_name=(info and info.description) or name,
         )
 
     def _refined(

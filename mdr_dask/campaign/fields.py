@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -15,24 +15,11 @@ from mdr_dask.models.base import unit_of
 from mdr_dask.models.data_file import DataFile
 
 
-class Entry(NamedTuple):
-    """A key that a campaign file may have."""
-
-    # Dotted name, such as ``indenter.angle``.
-    path: str
-    # The parameter set with this key.
-    parameters: type[BaseModel]
-    # The field of pydantic.
-    info: FieldInfo
-    # Nested parameter sets that may be written as the value.
-    structures: tuple[type[BaseModel], ...]
-
-
-def walk(parameters: type[BaseModel], before: str = "") -> Iterator[Entry]:
-    """Yield all keys of a parameter set and of its nested sets, except keys with only one possible value."""
+def walk(parameters: type[BaseModel], before: str = "") -> Iterator[tuple[str, type[BaseModel], FieldInfo]]:
+    """Yield the dotted name, the parameter set and the field of all keys with more than one possible value."""
     for name, info in parameters.model_fields.items():
         if name not in fixed(parameters):
-            yield Entry(f"{before}{name}", parameters, info, structures(info))
+            yield f"{before}{name}", parameters, info
             for structure in structures(info):
                 yield from walk(structure, f"{before}{name}.")
 
@@ -119,6 +106,12 @@ def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[Base
             return kind, part
         kind = structure(kind.model_fields[part], data)
     return None
+
+
+def field_at(parameters: type[BaseModel], path: Path, data: Any) -> FieldInfo | None:
+    """Return the field at a path in the data, or None if there is no such field."""
+    found = owner(parameters, path, data)
+    return found[0].model_fields[found[1]] if found else None
 
 
 def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:

@@ -73,18 +73,13 @@ def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: An
         if isinstance(value, Mapping) and part in value:
             path, value = (*path, part), value[part]
             continue
-        info = _field(kind, path, data)
+        info = fields.field_at(kind, path, data)
         claimed = fields.structure(info, value) if info else None
         if info and claimed:
             others = {one.__name__ for one in fields.structures(info)} - {claimed.__name__}
             if part in others or str(part).startswith("literal["):
                 return True
     return False
-
-
-def _field(kind: type[BaseModel], path: Path, data: Any) -> FieldInfo | None:
-    found = fields.owner(kind, path, data)
-    return found[0].model_fields[found[1]] if found else None
 
 
 def value_at(data: Any, path: Path) -> Any:
@@ -131,7 +126,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return a hint that a unit may have been forgotten after a number that is out of bounds without the unit."""
-    value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
+    value, info, unit = value_at(data, path), fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
         return ""
@@ -143,7 +138,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return a hint how to write a value that is a single word instead of a mapping or a list."""
-    value, info = value_at(data, path), _field(kind, path, data)
+    value, info = value_at(data, path), fields.field_at(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
     for one in fields.structures(info):
@@ -197,7 +192,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
 
 def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return the kinds of mappings that a parameter accepts, such as ``a mapping with shape: 'cone' or 'plane'``."""
-    info = _field(kind, path, data)
+    info = fields.field_at(kind, path, data)
     structures = fields.structures(info) if info else ()
     keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
     if not keys:
@@ -217,14 +212,14 @@ def _listed(words: Iterable[str]) -> str:
 
 
 def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
-    info, wanted = _field(kind, path, data), _quantity(path, kind, data)
+    info, wanted = fields.field_at(kind, path, data), _quantity(path, kind, data)
     what = f"missing, expected {wanted}" if wanted else "missing"
     return f"{what}: {info.description}" if info and info.description else what
 
 
 def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return a description of a quantity that contains a usual value. The text is empty for a field without a unit."""
-    info, unit = _field(kind, path, data), fields.unit_at(kind, path, data)
+    info, unit = fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     return expected(unit, "".join(fields.usual(info)[:1])) if info and unit else ""
 
 

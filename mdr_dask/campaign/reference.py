@@ -92,7 +92,7 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
 
 def alternatives_of(model: Model[Any]) -> list[str]:
     """Return the alternatives of a model, one line for each group: ``length with rms_roughness, or profile``."""
-    nested = [(f"{entry.path}.", kind) for entry in fields.walk(model.parameters) for kind in entry.structures]
+    nested = [(f"{path}.", kind) for path, _, info in fields.walk(model.parameters) for kind in fields.structures(info)]
     return [
         describe(tuple(tuple(f"{before}{name}" for name in member) for member in group))
         for before, kind in [("", model.parameters), *nested]
@@ -162,11 +162,12 @@ def _symbols(line: str) -> str:
 
 
 def _rows(parameters: type[BaseModel], first: str) -> Iterator[dict[str, str]]:
-    for path, kind, info, structures in fields.walk(parameters):
+    for path, kind, info in fields.walk(parameters):
         name = path.rpartition(".")[2]
         condition = ", ".join(f"{key}: {value}" for key, value in fields.fixed(kind).items())
         nested = [
-            fields.written(each, dict.fromkeys(each.model_fields, "...")).replace(": ...", "") for each in structures
+            fields.written(each, dict.fromkeys(each.model_fields, "...")).replace(": ...", "")
+            for each in fields.structures(info)
         ]
         yield {
             first: path,

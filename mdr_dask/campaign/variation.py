@@ -8,7 +8,6 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.definition import Spread, tidy
@@ -99,7 +98,7 @@ class _Search:
 
     def below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
         """Yield the variations of one parameter and of the parameters nested in it."""
-        info = self._field(path)
+        info = fields.field_at(self.parameters, path, self.data)
         if info is None:
             return
         if isinstance(value, list) and (not fields.holds_list(info) or any(isinstance(one, list) for one in value)):
@@ -177,7 +176,7 @@ class _Search:
         low, high = (self._end(path, kind, content[index], (*at, index)) for index in range(2))
         if low == high:
             self._complain(at, f"expected two different ends, got {shown(content[0])} and {shown(content[1])}", at[:-1])
-        info = self._field(path)
+        info = fields.field_at(self.parameters, path, self.data)
         kinds = fields.members(info.annotation) if info else ()
         return Spread(low, high, kind == "geometric", whole=int in kinds and float not in kinds)
 
@@ -219,10 +218,6 @@ class _Search:
         if kind == "geometric" and number <= 0:
             self._complain(at, f"expected an end above 0 for a geometric range, got {shown(value)}", name)
         return number
-
-    def _field(self, path: tuple[str, ...]) -> FieldInfo | None:
-        found = fields.owner(self.parameters, path, self.data)
-        return found[0].model_fields[found[1]] if found else None
 
     def _origin(self, path: Path, name: Path) -> Origin:
         return Origin(dotted(name), self.document.place(path), path)

@@ -46,11 +46,11 @@ def questions(
     asked: set[Path] = set()
     for name, given in data.items():
         for field, at, value in _scalars(given, (name,), paths[name]):
-            found = fields.owner(parameters, field, data)
-            if found is None or field in asked or isinstance(value, bool) or not isinstance(value, int | float):
+            info = fields.field_at(parameters, field, data)
+            if info is None or field in asked or isinstance(value, bool) or not isinstance(value, int | float):
                 continue
             unit = units.get(dotted(field), fields.unit_at(parameters, field, data) or "1")
-            usual = fields.usual(found[0].model_fields[found[1]])
+            usual = fields.usual(info)
             if usual and document.place(at) not in document.problems and is_doubtful(value, unit, usual):
                 asked.add(field)
                 yield str(Problem(document.place(at), dotted(at), _question(value, unit, usual)))

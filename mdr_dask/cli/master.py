@@ -26,10 +26,6 @@ if TYPE_CHECKING:
 PARTS = ("factors", "curve", "points")
 """Parts of the result that can be printed: shift factors, the merged curve with its error, or all shifted points."""
 
-LAWS = ("power", "arrhenius", "wlf")
-FAR, LEAST = 5.0, 0.002
-"""A point is reported if its distance from the merged curve exceeds both FAR standard deviations and LEAST decades."""
-
 KEPT = (".json", ".csv")
 
 
@@ -224,7 +220,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     for name, value in constants.items():
         interval = f"[{float(curve[f'{name}_low']):.5g}, {float(curve[f'{name}_high']):.5g}]"
         click.echo(f"{name} = {value:.5g} {curve[name].attrs['units']}, 95 %: {interval}".replace(" 1,", ","), err=True)
-    for law in LAWS:
+    for law in ("power", "arrhenius", "wlf"):
         if f"{law}_residual" in curve:
             click.echo(
                 f"the law {law} deviates from the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)",
@@ -232,28 +228,6 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
             )
     if "law_holds" in curve:
         click.echo(f"law_holds = {curve['law_holds'].item()}", err=True)
-    _print_outliers(curve)
     for sentence in ("not_used", "left_out", "undetermined"):
         if curve.attrs.get(sentence):
             click.echo(curve.attrs[sentence], err=True)
-
-
-def _print_outliers(curve: xr.Dataset) -> None:
-    """Print how many points are farther from the curve than scatter explains, and which point is farthest."""
-    import numpy as np
-
-    x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())
-    merged = np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve["curve_ordinate"].to_numpy())
-    off, scatter = y - np.interp(x, *merged), float(curve.attrs["ordinate_noise"])
-    far = np.abs(off) > max(FAR * scatter, LEAST)
-    if not far.any():
-        return
-    worst, by, over = int(np.argmax(np.abs(off))), str(curve.attrs["group"]), str(curve.attrs["abscissa"])
-    group = float(curve["point_group"][worst])
-    shift = float(curve["point_shift"][worst] if "point_shift" in curve else curve["shift_factor"].sel({by: group}))
-    click.echo(
-        f"{far.sum()} of {far.size} points lie off the curve by more than {FAR:g} times the scatter, the farthest "
-        f"{off[worst]:+.2g} decades at {by} = {group:.6g}, {over} = {10 ** (x[worst] - shift):.4g}: "
-        "error bars include scatter only, so inspect the figure",
-        err=True,
-    )

@@ -30,11 +30,6 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     """
     if question.sort:
         raise DataError("expected a table (.csv, .jsonl or .parquet) with --sort, got labelled arrays")
-    if question.group_by and question.statistics is None:
-        raise DataError(
-            "expected statistics with --group-by, got single realisations (use only one of --group-by and "
-            "--realisations)"
-        )
     columns = [name for name in question.columns if name not in dataset.coords]
     shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)], tell)
     used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])

@@ -49,6 +49,13 @@ class Question:
     statistics: tuple[str, ...] | None = MEANS
     written: bool = False
 
+    def __post_init__(self) -> None:
+        if self.group_by and self.statistics is None:
+            raise DataError(
+                "expected statistics with --group-by, got single realisations (use only one of --group-by and "
+                "--realisations)"
+            )
+
 
 @dataclass(frozen=True)
 class Table:
@@ -87,11 +94,6 @@ class _Maker:
 
     def __init__(self, dataset: xr.Dataset, question: Question, tell: Tell) -> None:
         raw = question.statistics is None
-        if raw and question.group_by:
-            raise DataError(
-                "expected statistics with --group-by, got single realisations (use only one of --group-by "
-                "and --realisations)"
-            )
         texts = [question.where, *question.sort, *question.columns]
         named = [name for text in texts if text for name in parse(text).names]
         shown = outputs(dataset, question.outputs, tell) if question.outputs or not question.columns else dataset[[]]
