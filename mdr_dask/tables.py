@@ -241,9 +241,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     names, units = _names_and_units(grid, head)
     _require_even(grid, rows, len(units), head)
     cells = _with_points(grid, rows)[:, : len(units)]
-    if _ends_with_mean(cells, grid.number[rows]):
-        cells, (*rows, last) = cells[:-1], rows
-        notes = (f"{grid.lines[last]}: the mean of the rows above", *notes)
+    if not is_name and _ends_with_mean(cells, grid.number[rows]):
+        notes = (f"{grid.lines[rows[-1]]}: the mean of the rows above", *notes)
+        rows, stated, cells = rows[:-1], stated[:-1], cells[:-1]
     first = grid.lines[rows[0] if head.names is None else head.names]
     sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, notes)
     known = [plain(name) for name in names]
@@ -471,7 +471,7 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 
 
 def _ends_with_mean(cells: Cells, number: BoolArray) -> bool:
-    """Return whether the last row has the mean of the rows above in all columns, of which two or more vary."""
+    """Return whether the last row is the mean of the rows above in all its numbers, and two or more columns vary."""
     varied = 0
     for column in np.flatnonzero(number[-1, : cells.shape[1]]) if len(cells) > 2 else ():
         text, above = cells[-1, column], cells[:-1, column][number[:-1, column]].astype(np.float64)
@@ -653,7 +653,8 @@ def _values(
 
 def _values_or_nan(cells: Cells) -> FloatArray:
     """Return cells as numbers; a cell that is not a number becomes NaN."""
-    return np.array([float(text) if _NUMBER.fullmatch(text) else math.nan for text in cells.flat]).reshape(cells.shape)
+    texts: list[str] = cells.ravel().tolist()
+    return np.array([float(text) if _NUMBER.fullmatch(text) else math.nan for text in texts]).reshape(cells.shape)
 
 
 def numbers(sheet: Sheet) -> FloatArray:
