@@ -296,8 +296,8 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
     rows = [_split(line.text, separator) for line in lines]
     has_names = not any(map(_NUMBER.fullmatch, rows[0])) and not _are_units(rows[0])
     for comment in [] if has_names else reversed(every[: every.index(texts[0])]):
-        cells = ((each, _split(comment.text.lstrip(COMMENT + " "), each)) for each in SEPARATORS)
-        fitting = [(each, names) for each, names in cells if len(names) == len(rows[0]) > 1]
+        split = ((each, _split(comment.text.lstrip(COMMENT + " "), each)) for each in SEPARATORS)
+        fitting = [(each, names) for each, names in split if len(names) == len(rows[0]) > 1]
         if not fitting or any(map(_NUMBER.fullmatch, fitting[0][1])):
             break
         rows, lines = [fitting[0][1], *rows], [comment._replace(separator=fitting[0][0]), *lines]
