@@ -215,17 +215,14 @@ def measured_of(dataset: xr.Dataset) -> Measured:
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:
     """Return the groups of a study with another table of measured points, given as a path or a pandas DataFrame."""
-    named = {"name": "measured", "text": table.to_csv(index=False)} if hasattr(table, "to_csv") else read_file(table)
+    if hasattr(table, "to_csv"):
+        named = {"name": "measured", "text": table.to_csv(index=False)}
+    else:
+        try:
+            named = {"name": Path(table).name, "text": decoded(Path(table).read_bytes(), str(table))}
+        except OSError as error:
+            raise DataError(f"{table}: {error.strerror}") from None
     return {key: data.assign_attrs(measured=named) for key, data in groups.items()}
-
-
-def read_file(path: str | Path) -> dict[str, str]:
-    """Return the name of a file and the text of the table in it, in the form in which a study stores both."""
-    path = Path(path)
-    try:
-        return {"name": path.name, "text": decoded(path.read_bytes(), str(path))}
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from None
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -128,34 +128,27 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
         np.all([key == one for key, one in zip(keys, row, strict=True)], axis=0) for row in set(zip(*keys, strict=True))
     ]
     fewest = min(int(np.sum(places)) for places in members)
-    found = [_within(x, y, members, degree) for degree in DEGREES if degree + 2 < fewest]
+    found = [_scatter(x, y, members, degree) for degree in DEGREES if degree + 2 < fewest]
     chance = np.nan
     if found:
-        within = min(found, key=lambda each: each.criterion(x.size))
+        _, within, freedom = min(found)
         squares = float(np.sum(off**2))
-        more = max(min(squares / float(curve.attrs[f"{name}_noise"]) ** 2, x.size) - within.freedom, 1.0)
-        excess = max(squares - within.squares, 0.0) / more
-        chance = float(fdtrc(more, within.freedom, excess * within.freedom / max(within.squares, 1e-300)))
+        more = max(min(squares / float(curve.attrs[f"{name}_noise"]) ** 2, x.size) - freedom, 1.0)
+        excess = max(squares - within, 0.0) / more
+        chance = float(fdtrc(more, freedom, excess * freedom / max(within, 1e-300)))
     worst = int(np.argmax(np.abs(off)))
     return law_holds(LOG * off, chance, 0, f"{curve.attrs['abscissa']} = {10 ** x[worst]:.3g} of the merged curve")
 
 
-class _Within(NamedTuple):
-    """The sum of squared residuals of each curve from its own polynomial, and the degrees of freedom of this sum."""
+def _scatter(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> tuple[float, float, int]:
+    """Return the squared residuals of each curve from its own polynomial, summed over the curves.
 
-    squares: float
-    freedom: int
-
-    def criterion(self, points: int) -> float:
-        """Return Schwarz's criterion, whose smallest value selects the degree of the polynomials."""
-        mean = max(self.squares, 1e-300) / points
-        return float(points * np.log(mean) + (points - self.freedom) * np.log(points))
-
-
-def _within(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> _Within:
+    Schwarz's criterion, which selects the degree, stands before the sum, and the degrees of freedom behind it.
+    """
     squares, freedom = 0.0, 0
     for places in members:
         fitted = np.polynomial.Polynomial.fit(x[places], y[places], degree)
         squares += float(np.sum((y[places] - fitted(x[places])) ** 2))
         freedom += int(np.sum(places)) - degree - 1
-    return _Within(squares, freedom)
+    criterion = x.size * np.log(max(squares, 1e-300) / x.size) + (x.size - freedom) * np.log(x.size)
+    return float(criterion), squares, freedom

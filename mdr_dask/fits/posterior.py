@@ -64,7 +64,7 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
                 found.append(prior - 0.5 * (square + determinant))
         return np.stack(found, axis=1)
 
-    step = max(1, _STEP // (values.size * (4 + prediction.realisations // 8)))
+    step = max(1, _STEP // (8 * values.size))
     return lambda places: np.concatenate([of(places[k : k + step]) for k in range(0, len(places), step)])
 
 

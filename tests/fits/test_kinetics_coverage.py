@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from fit_studies import judged
 
 from mdr_dask.fits import available
 from mdr_dask.fits.jumps import jump_law
@@ -56,10 +57,6 @@ def coverage(found: xr.Dataset, name: str, truth: object) -> float:
     known = found[f"{name}_low"].notnull()
     held = (found[f"{name}_low"] <= truth) & (truth <= found[f"{name}_high"])
     return float(held.where(known).mean())
-
-
-def judged(found: xr.Dataset, verdict: str) -> float:
-    return float(found["fitted_law_holds"].str.startswith(verdict).mean())
 
 
 RATE, BEFORE = (0.05 * TAU * WAVENUMBER) ** 0.5, 0.05 * np.sqrt(0.01 * TAU * WAVENUMBER)
