@@ -1,7 +1,6 @@
 """Run a campaign: rounds, resumed runs, failures and progress. Only this package computes with Dask."""
 
-from mdr_dask.execute.events import Event, Tell
-from mdr_dask.execute.progress import Progress
+from mdr_dask.execute.events import Event, Progress, Tell
 from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.rounds import outlook, run
 from mdr_dask.store import Part

@@ -1,9 +1,9 @@
-"""Events of a run, for its log and for the terminal."""
+"""Events and progress of a run, for its log and for the terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mdr_dask.models.base import Status
@@ -39,3 +39,69 @@ def ended(work: Work, outcome: Outcome) -> Event:
     failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
     seconds = outcome.compute_seconds + outcome.write_seconds
     return of_block("failed" if failed else "done", work, results=counts, seconds=round(seconds, 6))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The state of a run, counted in results. A result is one case in one realisation."""
+
+    # Numbers of results. `total` counts the results of all rounds so far, and `kept` the results that were in the store
+    # before the run. `done`, `failed` (including not converged) and `not_needed` count the results that this run has
+    # written.
+    total: int = 0
+    kept: int = 0
+    done: int = 0
+    failed: int = 0
+    not_needed: int = 0
+    # Number of failed results among `kept`.
+    kept_failed: int = 0
+    # Number of results of this run that are done but have a warning, for example because they miss the accuracy.
+    warned: int = 0
+    # Number of blocks and number of solutions that this run has computed. Several results may share one solution.
+    blocks: int = 0
+    solves: int = 0
+    # Number of operations of all rounds so far, and number of operations of the finished blocks.
+    estimated: float = 0.0
+    finished: float = 0.0
+    # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the
+    # start of the run. The first three are sums over all threads.
+    compute_seconds: float = 0.0
+    compile_seconds: float = 0.0
+    write_seconds: float = 0.0
+    wall_seconds: float = 0.0
+
+    @property
+    def to_do(self) -> int:
+        """Number of results that this round has not computed yet."""
+        return self.total - self.kept - self.done - self.failed - self.not_needed
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated time in s to the end of this round, from the pace of finished blocks; None before the first one.
+
+        The pace does not include the time for compiling kernels.
+        """
+        busy = self.compute_seconds + self.write_seconds
+        if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):
+            return None
+        pace = max(busy - self.compile_seconds, 0.0) / self.finished
+        side_by_side = max(busy / self.wall_seconds, 1.0)
+        return pace * max(self.estimated - self.finished, 0.0) / side_by_side
+
+    def after(self, outcome: Outcome, wall_seconds: float) -> Progress:
+        """Return the state after one more block, which ended `wall_seconds` after the start."""
+        counts = outcome.counts
+        return replace(
+            self,
+            done=self.done + counts[Status.DONE],
+            failed=self.failed + counts[Status.FAILED] + counts[Status.NOT_CONVERGED],
+            not_needed=self.not_needed + counts[Status.NOT_NEEDED],
+            warned=self.warned + outcome.warned,
+            blocks=self.blocks + 1,
+            solves=self.solves + outcome.solves,
+            finished=self.finished + outcome.operations,
+            compute_seconds=self.compute_seconds + outcome.compute_seconds,
+            compile_seconds=self.compile_seconds + min(outcome.compile_seconds, outcome.compute_seconds),
+            write_seconds=self.write_seconds + outcome.write_seconds,
+            wall_seconds=wall_seconds,
+        )

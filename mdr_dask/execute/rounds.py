@@ -18,9 +18,8 @@ from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
-from mdr_dask.execute.events import Event, Tell, ended
+from mdr_dask.execute.events import Event, Progress, Tell, ended
 from mdr_dask.execute.executors import Executor
-from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.stages import Places, cases_of, following, stored_layout
 from mdr_dask.plan import Template

@@ -16,12 +16,11 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 from pydantic import BaseModel
-from zarr.abc.store import Store
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from mdr_dask import models
 from mdr_dask.campaign import Campaign
-from mdr_dask.models.base import Status
+from mdr_dask.models.base import Output, Status
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.plan import Template
 from mdr_dask.store.files import (
@@ -55,8 +54,6 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     metadata of arrays; metadata of groups; finally ``zarr.json``. A new store first gets a ``zarr.json`` without
     arrays.
     """
-    if is_laid_out(url, layout):
-        return
     held = document(url)
     if held is None:
         write_bytes(url, "zarr.json", group_document({}, {"mdr_dask_layout": LAYOUT}))
@@ -193,13 +190,6 @@ def _arrays_and_coordinates(template: Template) -> tuple[dict[str, Any], dict[st
         )
         array[...] = values
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
-    for output in template.outputs:
-        attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
-        if output.has_error and output.error in template.outputs:
-            attrs["ancillary_variables"] = output.error.name
-        if output.comment:
-            attrs["comment"] = output.comment
-        _create(store, template, output.name, output.dims, template.extra_shape(output), "float64", attrs)
     flags: dict[str, Any] = {
         "long_name": "state of the case",
         "units": "1",
@@ -207,34 +197,35 @@ def _arrays_and_coordinates(template: Template) -> tuple[dict[str, Any], dict[st
         "flag_values": [int(status) for status in Status],
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
-    _create(store, template, "status", (), (), "int8", flags)
+    outputs = [
+        (output.name, output.dims, template.extra_shape(output), np.nan, _attributes_of(output, template, along))
+        for output in template.outputs
+    ]
+    for name, further, extra, missing, attrs in [*outputs, ("status", (), (), np.int8(Status.MISSING), flags)]:
+        zarr.create_array(
+            store,
+            name=name,
+            shape=(*template.shape, *extra),
+            chunks=tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra)),
+            dtype=np.asarray(missing).dtype,
+            fill_value=missing,
+            compressors=_compressors(),
+            dimension_names=(*template.dims, *further),
+            attributes=attrs,
+        )
     end = "/zarr.json"
     found = {name: content.to_bytes() for name, content in files.items() if name != "zarr.json"}
     arrays = {name.removesuffix(end): json.loads(content) for name, content in found.items() if name.endswith(end)}
     return arrays, {name: content for name, content in found.items() if not name.endswith(end)}
 
 
-def _create(
-    store: Store,
-    template: Template,
-    name: str,
-    further: tuple[str, ...],
-    extra: tuple[int, ...],
-    dtype: str,
-    attrs: dict[str, Any],
-) -> None:
-    """Create the array of an output, or the ledger, in a store in memory."""
-    zarr.create_array(
-        store,
-        name=name,
-        shape=(*template.shape, *extra),
-        chunks=tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra)),
-        dtype=dtype,
-        fill_value=np.nan if dtype == "float64" else int(Status.MISSING),
-        compressors=_compressors(),
-        dimension_names=(*template.dims, *further),
-        attributes=attrs,
-    )
+def _attributes_of(output: Output, template: Template, along: str) -> dict[str, Any]:
+    attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
+    if output.has_error and output.error in template.outputs:
+        attrs["ancillary_variables"] = output.error.name
+    if output.comment:
+        attrs["comment"] = output.comment
+    return attrs
 
 
 def _compressors() -> list[Any]:
