@@ -13,12 +13,10 @@ KINDS = {
     "campaigns": ("benchmarks.campaigns", "error and time of whole campaigns that are given an accuracy"),
     "peers": ("benchmarks.peers", "solvers beside other programs: docs/comparison.md"),
     "runner": ("benchmarks.runner.compare", "the runner beside joblib, dask, xyzpy and pipefunc, and after a kill"),
-    "kills": ("benchmarks.runner.kills", "a campaign in parts that are killed at random"),
     "validity": ("benchmarks.surfaces.validity", "the method beside a half-space: docs/validity.md"),
     "persson": ("benchmarks.surfaces.persson", "friction of lines beside Persson's theory: docs/validity.md"),
     "road": ("benchmarks.surfaces.road", "the generated road of campaigns/road.yaml"),
     "high_speed": ("benchmarks.high_speed", "friction at very high velocity: docs/high-speed.md"),
-    "published_factors": ("benchmarks.published_factors", "shift factors beside published ones: docs/master-curves.md"),
     "thesis": ("benchmarks.thesis.page", "the thesis, claim by claim: docs/thesis.md"),
 }
 

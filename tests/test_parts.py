@@ -134,6 +134,7 @@ def test_parts_killed_at_random_end_with_the_bytes_of_an_undisturbed_run(toy, tm
     assert run(study(60), parts).done == 0
     run(study(60), whole)
     assert digests(parts) == digests(whole)
+    assert store.verify(parts).findings == []
     assert sum(attempt - 1 for attempt in store.attempts(parts, "").values()) <= kills
 
 
