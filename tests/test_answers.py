@@ -56,8 +56,8 @@ def _missed(series):
     return found.assign(level_low=found.level_low - 0.5, level_high=found.level_high + 0.5)
 
 
-LEVEL = Fit("level", ("toy",), "mean height", _level, apart=True, constants=("level",))
-MISSED = Fit("missed", ("toy",), "mean height by a law that misses it", _missed, apart=True, constants=("level",))
+LEVEL = Fit("level", ("toy",), "mean height", _level, constants=("level",))
+MISSED = Fit("missed", ("toy",), "mean height by a law that misses it", _missed, constants=("level",))
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ class Fit:
     models: tuple[str, ...]
     summary: str
     compute: Callable[[Mapping[str, xr.Dataset]], xr.Dataset]
-    apart: bool = False
+    apart: bool = True
     constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
 
     def constants_of(self, campaign: Campaign) -> tuple[str, ...]:

@@ -341,7 +341,6 @@ FITS: tuple[Fit, ...] = (
         (),
         "unknown parameters from the table `measured`: the axes of the study that are not columns of this table",
         calibration,
-        apart=True,
         constants=unknowns,
     ),
 )

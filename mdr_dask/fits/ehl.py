@@ -94,6 +94,5 @@ FITS: tuple[Fit, ...] = (
         ("ehl_line",),
         "h/R = factor W^load U^speed G^material for a map of films; compared with Pan and Hamrock (eq. 5.3)",
         _film_exponents,
-        apart=True,
     ),
 )

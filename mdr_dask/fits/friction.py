@@ -272,7 +272,6 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
         lambda series: each(series, load_and_velocity_axes, _zone_one, FRICTION),
-        apart=True,
         constants=("alpha", "beta"),
     ),
     Fit(
@@ -280,7 +279,6 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "largest mu / slope over the velocities, compared with sqrt 2 (eq. 3.15)",
         lambda series: each(series, _velocity_axes, _plateau, FRICTION),
-        apart=True,
         constants=("plateau", "plateau_of_contact"),
     ),
     Fit(
@@ -288,7 +286,6 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "alpha and beta of the law for both zones and regions I to III (eq. 3.17)",
         lambda series: each(series, load_and_velocity_axes, _interpolation, FRICTION),
-        apart=True,
         constants=("alpha", "beta"),
     ),
 )

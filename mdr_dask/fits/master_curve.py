@@ -290,6 +290,7 @@ FITS = (
         ("sliding_friction",),
         "mu(F_N, v) = Q(log F_N + shift(v)), shift = exponent log v (thesis 3.44-3.46)",
         _of_store,
+        apart=False,
         constants=("shift_factor", "vertical_factor", "second_factor", "power_exponent"),
     ),
 )

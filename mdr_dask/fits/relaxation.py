@@ -306,7 +306,6 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "mu = mu_2 + mu* exp(-b t') for every case: rate b, duration, slip length; law of eqs. 4.13 to 4.15",
         lambda series: each_jump(series, lambda data: [], _relaxation, TRACE),
-        apart=True,
         constants=tuple(FIELDS),
     ),
     Fit(
@@ -314,7 +313,6 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "b = factor (v_1 tau q_max)^power, below and above v_1 tau q_max = 1 (eq. 4.12)",
         _fit_power,
-        apart=True,
         constants=("power",),
     ),
 )
