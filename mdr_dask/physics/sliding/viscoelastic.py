@@ -16,7 +16,14 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution, refine
-from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_line
+from mdr_dask.physics.sliding.viscoelastic_sweep import (
+    CLOSED,
+    Passage,
+    Travelling,
+    begin_recovery,
+    multiply,
+    sweep_line,
+)
 from mdr_dask.physics.solids import LinearSolid, recovery_times
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
@@ -211,8 +218,10 @@ def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatAr
                 product[m] += deborah[m] * decayed[piece, m] * stretch[m]
                 stretch[m] *= 1 - decayed[piece, m]
         elif lengths[piece] > 0:
-            _take_stress(stretch, depth, moduli, glass)
-            multiply(amplitude_of, stretch, modes)
+            stress = depth
+            for m in range(terms):
+                stress += moduli[m] * stretch[m]
+            begin_recovery(depth, stress / glass, stretch, moduli, modes, amplitude_of)
             strain = 0.0
             for k in range(terms):
                 integral[k] = modes[k] * times[k] * decayed[piece, k]
@@ -224,24 +233,6 @@ def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatAr
             for m in range(terms):
                 product[m] += modes[m]
                 stretch[m] += depth - strain
-
-
-@jit
-def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:
-    """Propagate a change of state through the sudden change of strain to zero stress, at the start of free recovery.
-
-    The strains of the dashpots stay the same.
-    """
-    if stretch.size == 0:
-        return
-    stress = depth
-    for m in range(stretch.size):
-        stress += moduli[m] * stretch[m]
-    balance = depth - stress / glass
-    for m in range(1, stretch.size):
-        stretch[m] -= stress / glass
-        balance += moduli[m] * stretch[m]
-    stretch[0] = -balance / moduli[0]
 
 
 @jit

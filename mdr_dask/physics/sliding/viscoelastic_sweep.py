@@ -211,7 +211,7 @@ def sweep_line(
     place, pieces, node = 0.0, 0, 1
     is_free, left = undeformed or push < 0, True
     if is_free and not undeformed:
-        _begin_recovery(penetration[0], push / glass, e, moduli, modes, amplitude_of)
+        begin_recovery(penetration[0], push / glass, e, moduli, modes, amplitude_of)
     while True:
         contact = _next_contact(place, node, modes, times, penetration, last) if is_free else place
         goal = contact if contact >= 0 else float(last)
@@ -231,7 +231,7 @@ def sweep_line(
         if not left:
             return pieces, OPEN_END
         node = int(workspace[2, 0])
-        _begin_recovery(strain, pressure / glass, e, moduli, modes, amplitude_of)
+        begin_recovery(strain, pressure / glass, e, moduli, modes, amplitude_of)
         is_free = True
 
 
@@ -304,7 +304,7 @@ def _stretch(
 
 
 @jit
-def _begin_recovery(
+def begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:
     """Write the recovery modes of an element after its strain has suddenly decreased from `strain` by `excess`.

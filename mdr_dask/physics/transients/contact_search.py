@@ -328,15 +328,10 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
     lowest = scan[LOWEST]
     while i < stop:
         lowest = (lowest - drift) * fade + drift
-        if approach >= skip.skip_until[np.uintp(i)]:
-            gap = lowest - search.depth - track.peak[np.uintp(i)]
-            if gap > 0 and gap > bounds.opened[window(2 * (i + 1 - oldest) + MARGIN)]:
-                _skip_until(skip, i, gap)
-            elif (
-                i >= search.n
-                or keeps_pressed(track, barriers, now.deborah, i, lift)
-                or lift > barriers.idle[np.uintp(i)]
-            ):
+        may_begin = approach >= skip.skip_until[np.uintp(i)]
+        if may_begin and not _stays_free(search, i, lowest - search.depth - track.peak[np.uintp(i)], oldest):
+            pressed = i >= search.n or keeps_pressed(track, barriers, now.deborah, i, lift)
+            if pressed or lift > barriers.idle[np.uintp(i)]:
                 break
         i += 1
     scan[LOWEST] = lowest
@@ -344,11 +339,18 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
 
 @jit_inline_uncounted
-def _skip_until(skip: SkipBounds, cell: int, gap: float) -> None:
-    """Skip a cell until the line has approached by the given gap."""
+def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
+    """Skip a cell until the line has approached by the given gap, if there was a gap all the time; return if so.
+
+    `oldest` is the place where the free elements in the cell can have separated at the earliest.
+    """
+    skip, opened = search.work.skip, search.work.recovery.bounds.opened
+    if not (gap > 0 and gap > opened[window(2 * (cell + 1 - oldest) + MARGIN)]):
+        return False
     until = skip.state[APPROACH] + gap
     skip.skip_until[np.uintp(cell)] = until
     skip.state[LARGEST] = max(skip.state[LARGEST], until)
+    return True
 
 
 @jit_inline_uncounted
@@ -469,7 +471,7 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     Elements may have separated near `high` earlier, even if there is no contact now. If `ended` is True, contact or a
     positive force has just ended at x.
     """
-    now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
+    now, scan, recovery = search.now, search.work.scan, search.work.recovery
     i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
     low, high = x - i, NONE
     if not cell.pressed:
@@ -484,12 +486,8 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
         return False, cell.stop
     u, u_slope, _ = displacement_at(now, recovery, probe)
     scan[LOWEST] = _lowest_behind(search, u) if by_force else u
-    clear = scan[LOWEST] - peak
-    if clear > 0:
-        oldest = _oldest(recovery, scan[FREE_FROM])
-        if clear > recovery.bounds.opened[window(2 * (i + 1 - oldest) + MARGIN)]:
-            _skip_until(work.skip, i, clear)
-            return False, cell.stop
+    if _stays_free(search, i, scan[LOWEST] - peak, _oldest(recovery, scan[FREE_FROM])):
+        return False, cell.stop
     h, slope, _ = height_at(now.track, probe)
     gap, top = depth + h - u, probe
     if gap <= 0 and gap > (slope - u_slope) * (probe - i - low):
