@@ -61,11 +61,10 @@ def fluid_friction(
     """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
 
     `log_viscosity` returns ln of the viscosity in Pa s at pressures in Pa; all other arguments are in SI units. The
-    shear stress is ``tau_E asinh(eta v/(h tau_E))``, so a large `eyring_stress` means a Newtonian liquid. `film_share`
-    is the fraction of the load, and of the pressure, that the film carries. Rolling friction is not included.
+    sliding velocity is not zero. The shear stress is ``tau_E asinh(eta v/(h tau_E))``, so a large `eyring_stress` means
+    a Newtonian liquid. `film_share` is the fraction of the load, and of the pressure, that the film carries. Rolling
+    friction is not included.
     """
-    if sliding_velocity == 0:
-        return 0.0
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
     logarithm = log_viscosity(film_share * contact.pressure * cosine) + np.log(

@@ -57,9 +57,9 @@ class GridSolution:
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
-        before, behind = _cell_around(self.nodes, self.front)
+        before, behind = cell_around(self.nodes, self.front)
         beside = self.front + 0.5 * (behind - before) * np.array([-1.0, 1.0])
-        there = _cell_around(nodes, front)
+        there = cell_around(nodes, front)
         moved = np.interp(nodes, [front - 1, *there, nodes[-1]], [0.0, *(beside - there), 0.0])
         return np.asarray(np.interp(nodes + moved, self.nodes, self.pressure))
 
@@ -136,7 +136,7 @@ class GridSolution:
         return float(np.clip(end, x[2], behind + cell))
 
 
-def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
+def cell_around(nodes: FloatArray, position: float) -> FloatArray:
     """Return the two nodes on either side of a position."""
     after = int(np.clip(np.searchsorted(nodes, position), 1, nodes.size - 1))
     return nodes[after - 1 : after + 1]

@@ -17,7 +17,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
-from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
+from mdr_dask.physics.lubrication.grid_solution import GridSolution, cell_around, expected
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
@@ -178,9 +178,9 @@ class LineSolution:
 
     def position(self, reading: Reading) -> Estimate:
         """Return a position in half widths, whose stated error is at least `PLACED` cells."""
-        found, nodes = self.estimate(reading), self.finest.nodes
-        after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
-        return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
+        found = self.estimate(reading)
+        before, after = cell_around(self.finest.nodes, float(found.value))
+        return found._replace(error=np.maximum(found.error, PLACED * (after - before)))
 
     def spike(self) -> tuple[Estimate, Estimate]:
         """Return position (in half widths) and pressure (in p0) of the spike; NaN if there is no spike.
@@ -193,9 +193,9 @@ class LineSolution:
         if not np.isfinite(position[-1]):
             none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
             return none, none
-        cell = float(np.diff(grid.nodes)[np.searchsorted(grid.nodes, position[-1]) - 1])
+        before, after = cell_around(grid.nodes, position[-1])
         moved, risen = (np.inf if each.size < 2 else float(max(each[-1], 0.5 * each[-2])) for each in changes)
-        errors = moved + cell, SAFETY * risen if grid.resolves_spike else np.inf
+        errors = moved + (after - before), SAFETY * risen if grid.resolves_spike else np.inf
         where, high = (
             Estimate(np.asarray(each[-1]), np.asarray(np.inf if np.isnan(error) else error))
             for each, error in zip((position, height), errors, strict=True)

@@ -185,13 +185,13 @@ class _Leg(NamedTuple):
         """The time of the last moment."""
         return float(self.moments[-1].time)
 
-    def at(self, time: float) -> tuple[Any, float, int, float]:
-        """Return the moment at a time, the dissipated energy over mu, the steps, and the least error of the edge."""
+    def at(self, time: float) -> tuple[Any, float, float]:
+        """Return the moment at a time, the dissipated energy divided by mu, and the least stated error of the edge."""
         number, moment = at(self.problem, self.moments, time, self.tolerance)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
         first, last = (self.problem.edge(self.moments[k].unknowns) for k in (max(number - 1, 0), number))
-        return moment, float(energy), number, EDGE * abs(last - first)
+        return moment, float(energy), EDGE * abs(last - first)
 
 
 def _fretted(
@@ -314,7 +314,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
 
 def _contact(leg: _Leg, time: float) -> Worn:
     """Turn the nodal values of partial slip at one time into a worn contact."""
-    problem, (moment, energy, steps, edge_error) = leg.problem, leg.at(time)
+    problem, (moment, energy, edge_error) = leg.problem, leg.at(time)
     assert isinstance(problem, PartialSlip)
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.inner_radius
     square, unknowns, path = problem.body.width, moment.unknowns, moment.path
@@ -360,7 +360,6 @@ def _contact(leg: _Leg, time: float) -> Worn:
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, a, depth, border),
         energy_volume=energy,
-        steps=steps,
         least_errors={"contact_radius": edge_error, "stick_border": EDGE * (border - last_border)},
     )
 
@@ -388,7 +387,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
 def _slid_contact(leg: _Leg, path: float) -> Worn:
     """Turn the nodal values after one sliding path into a worn contact. Its image is NaN outside the contact."""
-    problem, (moment, energy, steps, edge_error) = leg.problem, leg.at(path)
+    problem, (moment, energy, edge_error) = leg.problem, leg.at(path)
     assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated
     image, a = problem.image(unknowns), problem.edge(unknowns)
@@ -414,6 +413,5 @@ def _slid_contact(leg: _Leg, path: float) -> Worn:
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
         energy_volume=energy,
-        steps=steps,
         least_errors={"contact_radius": edge_error},
     )

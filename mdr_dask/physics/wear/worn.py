@@ -48,8 +48,6 @@ class Worn:
     energy_volume : float
         The dissipated energy divided by mu, in the unit of volume. According to the wear law, it equals the wear
         volume. NaN if it is unknown.
-    steps : int
-        Number of time steps.
     rougher : tuple of Worn
         One or two rougher solutions of the same contact, from which its error is estimated.
     least_errors : mapping of str to float
@@ -69,7 +67,6 @@ class Worn:
     image: Function
     pressure: Function
     energy_volume: float = np.nan
-    steps: int = 0
     rougher: tuple[Worn, ...] = ()
     least_errors: Mapping[str, float] = field(default_factory=dict)
     relative_error: float = np.nan
@@ -93,8 +90,10 @@ class Worn:
         if output not in FUNCTIONS:
             return max(SAFETY * float(self._distance(output, places)), self.least_errors.get(output, 0.0))
         crowd = self._crowd(float(places[-1]))
-        wide = _spread(self._distance(output, crowd))
-        return SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
+        finite = np.nan_to_num(self._distance(output, crowd), nan=0.0, posinf=0.0)
+        padded = np.pad(finite, REACH, mode="edge")
+        wide = np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1).max(axis=1)
+        return np.asarray(SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide)))
 
     def _distance(self, output: str, places: FloatArray) -> FloatArray:
         """Return the difference from the first rougher solution, or half that from the second one if it is larger.
@@ -112,13 +111,6 @@ class Worn:
         cuts = sorted({0.0, self.stick_border, self.contact_radius, farthest})
         steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
         return np.concatenate([low + (high - low) * steps**1.5 for low, high in pairwise(cuts)])
-
-
-def _spread(distance: FloatArray) -> FloatArray:
-    """Return, for each entry, the largest finite value among the entry and its `REACH` neighbours on each side."""
-    finite = np.where(np.isfinite(distance), distance, 0.0)
-    padded = np.pad(finite, REACH, mode="edge")
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1).max(axis=1))
 
 
 class Scar(NamedTuple):
