@@ -190,7 +190,7 @@ def expected(unit: str, usual: str = "") -> str:
 
 
 #: Prefixes of printed units by their powers of ten.
-_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
@@ -212,8 +212,8 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
         return f"{value:.{digits}g} {unit}"
     rounded = float(f"{value:.{digits}g}")
     power = 3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12)
-    power = power if power in _PREFIXES else 0
-    return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
+    power = power if power in PREFIXES else 0
+    return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {PREFIXES[power]}{unit}"
 
 
 def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:

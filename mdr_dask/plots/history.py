@@ -30,11 +30,10 @@ STEADY = "steady state at the end"
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time, one column for each series, with panels for a velocity and a force that change."""
-    needed = (BEFORE, JUMP, FRICTION)
-    found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
-    found = {name: data for name, data in found.items() if data[FRICTION].notnull().any()}
+    needed = {BEFORE, JUMP, FRICTION}
+    found = {name: data for name, data in groups.items() if needed <= data.keys() and data[FRICTION].notnull().any()}
     if not found:
-        raise DataError(f"expected a series with finished results of {', '.join(needed)}")
+        raise DataError(f"expected a series with finished results of {', '.join(sorted(needed))}")
     families = {name: curves.family(data, FRICTION, TIME) for name, data in found.items()}
     kept, left_out = curves.with_one_legend(families)
     rest, kept = kept[MOST_PANELS:], kept[:MOST_PANELS]

@@ -13,7 +13,7 @@ from mdr_dask import models
 from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError
 from mdr_dask.plots import page
-from mdr_dask.units import conversion
+from mdr_dask.units import PREFIXES, conversion
 
 #: Labels of the parameters of this package that have a symbol. The label of any other parameter is its name.
 SYMBOLS: Mapping[str, str] = {
@@ -44,8 +44,7 @@ SYMBOLS: Mapping[str, str] = {
 }
 #: Units that are shown instead of an SI unit if the campaign states no unit.
 USUAL = {"rad/s": "rpm", "rad": "deg"}
-#: Prefixes by their powers of a thousand, and units that may have a prefix.
-PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+#: Units that may have a prefix.
 _PREFIXED = re.compile(r"(m|Pa|N|s|W|ohm)(?:\^([23]))?")
 #: Patterns of symbols in the long names of outputs, and the mathtext that replaces them.
 _MATHTEXT = {r"\bd_mu_(\w+)": r"$\\Delta\\mu_{\1}$", r"\bmu_(\w+)": r"$\\mu_{\1}$", r"\b([A-Za-z])_(\w+)": r"$\1_{\2}$"}
@@ -103,8 +102,7 @@ def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
     largest = max((float(abs(array).where(np.isfinite(array)).max()) for array in arrays if array.size), default=np.nan)
     if not (np.isfinite(largest) and largest > 0):
         return unit
-    power = int(match[2] or 1)
-    step = int(np.floor(np.log10(largest) / (3 * power) + 1e-9))
+    step = 3 * int(np.floor(np.log10(largest) / (3 * int(match[2] or 1)) + 1e-9))
     return f"{PREFIXES.get(step, '')}{unit}"
 
 

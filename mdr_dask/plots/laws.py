@@ -50,7 +50,7 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
     return Law("law (eq. 3.40)", _rough_indenter) if model == "sliding_friction" else None
 
 
-def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
+def along(data: xr.Dataset, name: str) -> xr.Dataset:
     """Return the parameters of a curve at many values of `name`, so that a law becomes a smooth line.
 
     If one of the outputs `NEEDED` varies along the curve, the data are returned unchanged.
@@ -63,7 +63,7 @@ def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
     spread = np.geomspace if low > 0 else np.linspace
     held = data[[each for each in NEEDED if each in data]]
     fine: xr.Dataset = held.drop_vars(name, errors="ignore").assign_coords(
-        {name: (name, spread(low, high, count), values.attrs)}
+        {name: (name, spread(low, high, 200), values.attrs)}
     )
     return fine
 

@@ -159,12 +159,14 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 def _log_ticks(axis: Any) -> None:
     """Set the ticks of a logarithmic axis; with less than two decades, plain numbers such as 1, 2, 5, 10 and 20."""
-    from matplotlib.ticker import LogLocator, NullFormatter
+    from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
     axis.set_minor_formatter(NullFormatter())
     if 0 < high < 100 * low:
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        locator = LogLocator(subs=(1, 2, 5))
+        inside = [tick for tick in locator.tick_values(low, high) if low <= tick <= high]
+        axis.set_major_locator(locator if len(inside) > 1 else AutoLocator())
         axis.set_major_formatter(lambda value, _: f"{value:.4g}")
 
 

@@ -239,7 +239,8 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     families = [_families(part.series, view, output) for part in parts]
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
-    values = np.concatenate([_values(panel) for panel in panels])
+    drawn = [trace.column("y") for panel in panels for trace in panel.traces if trace.what == "data"]
+    values = np.concatenate(drawn)
     log = view.is_log("y", values, labels.quantity(output, first[output]))
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
@@ -251,11 +252,6 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     figure.bars = curves.meaning_of_bars(found.values(), [output])
     figure.leave_out([*left_out, *(sentence for one in every for sentence in one.left_out)])
     return figure
-
-
-def _values(panel: Panel) -> np.ndarray:
-    drawn = [trace.column("y") for trace in panel.traces if trace.kind in ("curve", "dots") and trace.what == "data"]
-    return np.concatenate(drawn) if drawn else np.array([])
 
 
 def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import platform
 import shlex
 from collections import Counter
@@ -79,28 +78,21 @@ class Study:
 def read_study(url: str) -> Study:
     """Read the content of a page about a study, which may be unfinished."""
     with store.readable(url):
-        return _read(url)
-
-
-def _read(url: str) -> Study:
-    held, whole = store.attributes(url), store.datasets(url)
-    read = {name: thinned(data) for name, data in whole.items()}
-    groups, left_out = (
-        {name: data for name, (data, _) in read.items()},
-        {name: texts for name, (_, texts) in read.items()},
-    )
-    with page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
-        return _study(url, held, whole, groups, left_out)
+        whole = store.datasets(url)
+        read = {name: thinned(data) for name, data in whole.items()}
+        groups = {name: data for name, (data, _) in read.items()}
+        with page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
+            return _study(url, whole, groups, {name: texts for name, (_, texts) in read.items()})
 
 
 def _study(
     url: str,
-    held: Mapping[str, Any],
     whole: Mapping[str, xr.Dataset],
     groups: dict[str, xr.Dataset],
     left_out: Mapping[str, list[str]],
 ) -> Study:
     omitted = [text for texts in left_out.values() for text in texts]
+    held = store.attributes(url)
     model = str(held["model"])
     counted = progress.counts(url)
     records = [record for name in groups for record in store.records(url, name)]
@@ -264,45 +256,31 @@ def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[
 
 
 def _law(url: str, name: str, summary: str, result: xr.Dataset) -> Table:
-    plain = {str(each): result[each] for each in result.data_vars}
+    names = [str(each) for each in result.data_vars]
     joined = [
-        each for each in plain if not any(each == f"{other}{end}" for other in plain for end in ("_low", "_high"))
+        each for each in names if not any(each == f"{other}{end}" for other in names for end in ("_low", "_high"))
     ]
     dims = [str(dim) for dim in result.sizes]
-    cells = math.prod(result.sizes[dim] for dim in dims)
-    along = {
-        dim: result[dim] if dim in result.coords else xr.DataArray(np.arange(result.sizes[dim]), dims=dim)
-        for dim in dims
-    }
+    frame = (result if dims else result.expand_dims("case")).to_dataframe(dim_order=dims or None).reset_index()
     rows = [
-        [*(_cell(along[dim].isel({dim: at[dim]})) for dim in dims), *(_interval(plain, each, at) for each in joined)]
-        for at in _places(result, dims)
+        [*(_cell(row[dim]) for dim in dims), *(_interval(row, each) for each in joined)]
+        for row in frame.head(MOST_ROWS).to_dict("records")
     ]
-    units = {each: str(plain[each].attrs.get("units", "1")) for each in joined}
+    units = {each: str(result[each].attrs.get("units", "1")) for each in joined}
     headings = [*dims, *(each if units[each] in ("1", "") else f"{each} [{units[each]}]" for each in joined)]
-    more = f"{cells - MOST_ROWS} more rows; " if cells > MOST_ROWS else ""
+    more = f"{len(frame) - MOST_ROWS} more rows; " if len(frame) > MOST_ROWS else ""
     command = f"mdr-dask fit {shlex.quote(url)} {name.split(' ')[0]}"
     return Table(f"{name}: {summary}", headings, rows, f"{more}{command}")
 
 
-def _places(result: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
-    places = np.ndindex(*(result.sizes[dim] for dim in dims))
-    for _, place in zip(range(MOST_ROWS), places, strict=False):
-        yield dict(zip(dims, map(int, place), strict=True))
-
-
-def _interval(columns: Mapping[str, xr.DataArray], name: str, at: Mapping[str, int]) -> str:
+def _interval(row: Mapping[Any, Any], name: str) -> str:
     """Return a constant as text, with the ends of its interval if they are known."""
-    parts = [columns[each] for each in (name, f"{name}_low", f"{name}_high") if each in columns]
-    cells = [part.isel({dim: place for dim, place in at.items() if dim in part.dims}) for part in parts]
-    if len(cells) < 3 or not all(np.isfinite(cell.item()) for cell in cells[1:]):
-        return _cell(cells[0])
-    return f"{_cell(cells[0])} ({_cell(cells[1])}, {_cell(cells[2])})"
+    low, high = (row.get(f"{name}{end}", np.nan) for end in ("_low", "_high"))
+    return f"{_cell(row[name])} ({_cell(low)}, {_cell(high)})" if np.isfinite([low, high]).all() else _cell(row[name])
 
 
-def _cell(value: xr.DataArray) -> str:
-    plain = value.item()
-    return f"{plain:.4g}" if isinstance(plain, float) else str(plain)
+def _cell(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
