@@ -190,7 +190,7 @@ def expected(unit: str, usual: str = "") -> str:
 
 
 #: Prefixes of printed units by their powers of ten.
-PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 

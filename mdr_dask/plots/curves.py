@@ -249,7 +249,7 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
     return {
         name: value
         for name, value in first.items()
-        if all(name in each and each[name].variable.equals(value.variable) for each in held)
+        if all(name in each and np.array_equal(each[name], value) for each in held)
     }
 
 
