@@ -14,6 +14,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.tables import Line, Read, Sheet, read_sheet, read_table
 from mdr_dask.units import shown
@@ -149,46 +150,47 @@ def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapp
                 raise DataError(f"{source}: {what}: name the column {axis}, or delete it")
 
 
-def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
+def require_readable(table: DataFile, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
     """Raise DataError if a table is too large, or does not fit any series of a campaign."""
-    if len(text) > LARGEST:
-        size, most = distinguishable(len(text) / 1e6, LARGEST / 1e6)
-        raise DataError(f"{source}: expected a table of at most {most} MB, got {size} MB")
-    reasons = []
-    for one in series:
-        try:
-            read_measured(text, source, *_of_series(model, outputs, one))
-        except DataError as error:
-            reasons.append(error)
-    if len(reasons) == len(series):
-        raise reasons[0]
+    size = len(table.read_text())
+    if size > LARGEST:
+        got, most = distinguishable(size / 1e6, LARGEST / 1e6)
+        raise DataError(f"{table.name}: expected a table of at most {most} MB, got {got} MB")
+    found = [each for _, each in _readings(table, model, outputs, series)]
+    if isinstance(found[0], DataError) and not any(isinstance(each, Measured) for each in found):
+        raise found[0]
 
 
-def notes(campaign: Campaign) -> tuple[str, ...]:
-    """Return notes on the measured points for each series: output, conditions, unknowns, and rows outside the study."""
-    table = campaign.measured
-    notes_found = []
-    for series in campaign.series if table else ():
+def _readings(
+    table: DataFile | None, model: str, outputs: Sequence[str], series: Sequence[Series]
+) -> Iterator[tuple[Series, Measured | DataError]]:
+    """Yield each series with its measured points, or with the reason why the table does not fit the series."""
+    for one in series if table else ():
         assert table is not None
-        conditions, outputs, axes = _of_series(campaign.model, campaign.outputs, series)
-        before = f"measured {table.name}{f', series {series.name}' if series.name else ''}"
         try:
-            found = read_measured(table.read_text(), table.name, conditions, outputs, axes)
-        except DataError:
-            notes_found.append(f"{before}: no measured points belong to this series")
-            continue
-        notes_found += [
-            f"{before}: {sentence}"
-            for sentence in _sentences(found, campaign.model, series, conditions, outputs[found.output])
-        ]
-    return tuple(notes_found)
+            yield one, read_measured(table.read_text(), table.name, *_of_series(model, outputs, one))
+        except DataError as error:
+            yield one, error
 
 
-def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str], unit: str) -> Iterator[str]:
+def notes(campaign: Campaign) -> Iterator[str]:
+    """Yield notes on the measured points for each series: output, conditions, unknowns, and rows outside the study."""
+    for series, found in _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series):
+        assert campaign.measured is not None
+        before = f"measured {campaign.measured.name}{f', series {series.name}' if series.name else ''}"
+        if isinstance(found, DataError):
+            yield f"{before}: no measured points belong to this series"
+        else:
+            yield from (f"{before}: {sentence}" for sentence in _sentences(found, campaign.model, series))
+
+
+def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
+    conditions, outputs, _ = _of_series(model, (found.output,), series)
+    units = conditions | outputs
     errors = "errors estimated by the fit"
     if found.errors is not None:
         errors = f"{found.error_column} taken as one standard error"
-    reach = (shown(float(end), unit) for end in (found.values.min(), found.values.max()))
+    reach = (shown(float(end), units[found.output]) for end in (found.values.min(), found.values.max()))
     yield f"{found.values.size} rows of {found.output}, {' to '.join(dict.fromkeys(reach))}, {errors}"
     yield f"compared with {found.output}: {models.load(model).output(found.output).long_name}"
     ranges = {
@@ -223,16 +225,8 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
     """Return the axes of a campaign for which its table of measured points has no column."""
-    table = campaign.measured
-    if table is None:
-        return ()
-    found: list[str] = []
-    for one in campaign.series:
-        try:
-            measured = read_measured(table.read_text(), table.name, *_of_series(campaign.model, campaign.outputs, one))
-        except DataError:
-            continue  # the table belongs to another series
-        found += _unknown(measured, one)
+    readings = _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series)
+    found = [name for series, each in readings if isinstance(each, Measured) for name in _unknown(each, series)]
     return tuple(dict.fromkeys(found))
 
 

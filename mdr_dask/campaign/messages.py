@@ -236,10 +236,7 @@ def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _structure_around(path: Path, kind: type[BaseModel], data: Any) -> type[BaseModel] | None:
-    inner: type[BaseModel] | None = kind
-    for depth, part in enumerate(path[:-1]):
-        info = inner.model_fields.get(str(part)) if inner else None
-        if isinstance(part, int):
-            continue
-        inner = fields.structure(info, value_at(data, path[: depth + 1])) if info else None
-    return inner
+    if len(path) == 1:
+        return kind
+    info = fields.field_at(kind, path[:-1], data)
+    return fields.structure(info, value_at(data, path[:-1])) if info else None

@@ -53,7 +53,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     measured = spec.measured.table if spec.measured else None
     if measured and series:
         try:
-            require_readable(measured.read_text(), measured.name, spec.model, outputs, series)
+            require_readable(measured, spec.model, outputs, series)
         except DataError as error:
             for line in str(error).splitlines():
                 document.report(("measured", "table"), line)

@@ -6,11 +6,11 @@ import json
 import os
 import platform
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -28,17 +28,22 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
 
     `about` contains facts about the run for the first line.
     """
-    if log is None:
-        yield _printer(quiet)
-        return
-    require_outside(log)
-    show = _printer(quiet)
-    with log.open("a", encoding="utf-8") as stream:
-        write = _writer(stream)
+    lock = threading.Lock()
+    if log is not None:
+        require_outside(log)
+    with nullcontext() if log is None else log.open("a", encoding="utf-8") as stream:
+
+        def write(name: str, facts: dict[str, Any]) -> None:
+            line = {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "event": name, **facts}
+            if stream is not None:
+                with lock:
+                    stream.write(json.dumps(line) + "\n")
+                    stream.flush()
 
         def tell(event: Event) -> None:
             write(event.name, dict(event.facts))
-            show(event)
+            if event.sentence and not quiet:
+                click.echo(printable(event.sentence), err=True)
 
         write("run begun", {**about, "mdr_dask": __version__, "host": platform.node(), "process": os.getpid()})
         try:
@@ -47,24 +52,3 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
             write("run interrupted", {"why": str(error) or type(error).__name__})
             raise
         write("run ended", {})
-
-
-def _printer(quiet: bool) -> Callable[[Event], None]:
-    def show(event: Event) -> None:
-        if event.sentence and not quiet:
-            click.echo(printable(event.sentence), err=True)
-
-    return show
-
-
-def _writer(stream: TextIO) -> Callable[[str, dict[str, Any]], None]:
-    """Return a function that writes one complete line to the log; any thread may call this function."""
-    lock = threading.Lock()
-
-    def write(name: str, facts: dict[str, Any]) -> None:
-        line = {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "event": name, **facts}
-        with lock:
-            stream.write(json.dumps(line) + "\n")
-            stream.flush()
-
-    return write

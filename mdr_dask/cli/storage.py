@@ -32,7 +32,7 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     """
     from mdr_dask import store as stores
 
-    if _is_packed(store):
+    if store.endswith(".zip") and Path(store).is_file():
         if repair:
             raise click.UsageError("--repair is for a store, not for a published zip; unpack it first")
         found, left = stores.verify_packed(Path(store)), None
@@ -47,10 +47,6 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     for finding in left.findings:
         click.echo(printable(f"left as it is: {finding.kind} {finding.name}: {finding.what}"), err=True)
     return 1 if left.findings else 0
-
-
-def _is_packed(store: str) -> bool:
-    return store.endswith(".zip") and Path(store).is_file()
 
 
 def _print(store: str, found: Inspection, limit: int) -> None:
