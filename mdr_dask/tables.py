@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, similar
 from mdr_dask.headings import Column, factors, fits, is_called, match, nearest, plain, split_unit
 from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
 
@@ -553,7 +553,9 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     absent = [column for column in columns if column.name not in present]
     unknown = [(place, sheet.names[place]) for place, (column, _, _) in enumerate(meanings) if column is None]
     for place, name in unknown:
-        if hint := nearest(name, [column.name for column in absent]):
+        unit = sheet.units[place]
+        alike = [column.name for column in absent if not unit or fits(unit, column)]
+        if hint := similar(name, [column.name for column in absent]) or nearest(name, alike):
             problems.append(sheet.head.problem(place, f"unknown column {name!r}{hint}"))
     taken: dict[str, int] = {}
     for place, (column, written, is_logarithm) in enumerate(meanings):

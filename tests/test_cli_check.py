@@ -141,10 +141,9 @@ def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, 
         "column 'standard_error' taken as one standard error",
         "measured rig.csv: conditions velocity 1 mm/s to 10.01 mm/s, relaxation_times 0.01 to 100",
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
-        "measured rig.csv: outside the ranges of the study, so that the fit will refuse the table: line 4, velocity "
-        "10.01 mm/s; line 5, relaxation_times 100",
     ):
         assert f"  {line}\n" in printed
+    assert "line 4, velocity 10.01 mm/s (study: 1 mm/s to 10 mm/s); line 5, relaxation_times 100 (study: " in printed
     assert "measured rig.csv: compared with friction_coefficient: coefficient of friction" in printed
 
 

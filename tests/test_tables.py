@@ -122,7 +122,9 @@ def test_each_column_has_one_message():
 
 def test_columns_that_resemble_nothing_are_not_used():
     optional = [Column("velocity", "m/s"), Column("mean_velocity", "m/s", needed=False)]
-    assert read_table("velocity [m/s];Torque\n1;2\n", "a.csv", optional).remark == "not used: Torque"
+    optional.append(Column("oil_density", "kg/m^3", needed=False))
+    read = read_table("velocity [m/s];Torque;oil temp [degC]\n1;2;3\n", "a.csv", optional)
+    assert read.remark == "not used: Torque, oil temp"
 
 
 def test_empty_entries_may_be_allowed():

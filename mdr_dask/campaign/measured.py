@@ -202,7 +202,8 @@ def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
     yield f"conditions {', '.join(ranges.values()) or 'none'}"
     yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
     outside = [
-        f"{line}, {name} {shown(float(value), units[name])}"
+        f"{line}, {name} {shown(float(value), units[name])} (study: {shown(low, units[name])} to "
+        f"{shown(high, units[name])})"
         for name, (low, high) in _reach(model, series, found.conditions).items()
         for line, value in zip(found.lines, found.conditions[name], strict=True)
         if not low - SAME * abs(low) <= value <= high + SAME * abs(high)
