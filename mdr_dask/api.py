@@ -15,47 +15,32 @@ Made by `python -m mdr_dask.api > docs/api.md`; do not edit. [Python](python.md)
 of the physics take and return numpy arrays in the units that each of them states. All examples are tested.
 """
 
-#: Public names by subject and module.
-PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "Studies": (
-        (
-            "mdr_dask.studies",
-            ("run", "check", "open_study", "table", "aggregate", "fit", "plot", "master_curve", "StudyAccessor"),
-        ),
-    ),
-    "Steady sliding": (
-        ("mdr_dask.physics.sliding.steady", ("steady_sliding",)),
-        ("mdr_dask.physics.sliding.cases", ("Steady",)),
-        ("mdr_dask.physics.sliding.viscoelastic", ("steady_viscoelastic_sliding",)),
-        ("mdr_dask.physics.surfaces.cubic_line", ("periodic_line", "indented_line")),
-    ),
-    "Solids": (
-        (
-            "mdr_dask.physics.solids",
-            ("kelvin", "prony", "complex_modulus", "relaxation_modulus", "fit_series", "wlf_factor"),
-        ),
-    ),
-    "Roughness": (("mdr_dask.physics.surfaces.roughness", ("amplitudes", "phases", "line", "spectral_slope")),),
-    "Transforms of the method of dimensionality reduction": (
-        ("mdr_dask.physics.mdr.transforms", ("forward_transform", "inverse_transform", "pressure", "volume")),
-        ("mdr_dask.physics.mdr.power_law_contact", ("contact_radius", "depth", "normal_force", "stick_radius")),
-    ),
-    "Fretting wear": (
-        ("mdr_dask.physics.wear.exact", ("exact",)),
-        ("mdr_dask.physics.wear.rules", ("limit", "fast")),
-        ("mdr_dask.physics.wear.worn", ("Worn",)),
-    ),
-    "Lubricated line contact": (
-        ("mdr_dask.physics.lubrication.line_contact", ("line_contact", "solve_film")),
-        ("mdr_dask.physics.lubrication.film_formulas", ("hertz_line", "dimensionless_groups", "moes_parameters")),
-    ),
-    "Oils": (
-        (
-            "mdr_dask.physics.lubrication.oil",
-            ("Oil", "walther_constants", "pressure_viscosity", "log_viscosity"),
-        ),
-    ),
-    "Superposition": (("mdr_dask.physics.superposition.master_curve", ("superpose", "Superposition", "rereference")),),
+#: Public names, separated by blanks, by subject and module.
+PUBLIC: dict[str, dict[str, str]] = {
+    "Studies": {"mdr_dask.studies": "run check open_study table aggregate fit plot master_curve StudyAccessor"},
+    "Steady sliding": {
+        "mdr_dask.physics.sliding.steady": "steady_sliding",
+        "mdr_dask.physics.sliding.cases": "Steady",
+        "mdr_dask.physics.sliding.viscoelastic": "steady_viscoelastic_sliding",
+        "mdr_dask.physics.surfaces.cubic_line": "periodic_line indented_line",
+    },
+    "Solids": {"mdr_dask.physics.solids": "kelvin prony complex_modulus relaxation_modulus fit_series wlf_factor"},
+    "Roughness": {"mdr_dask.physics.surfaces.roughness": "amplitudes phases line spectral_slope"},
+    "Transforms of the method of dimensionality reduction": {
+        "mdr_dask.physics.mdr.transforms": "forward_transform inverse_transform pressure volume",
+        "mdr_dask.physics.mdr.power_law_contact": "contact_radius depth normal_force stick_radius",
+    },
+    "Fretting wear": {
+        "mdr_dask.physics.wear.exact": "exact",
+        "mdr_dask.physics.wear.rules": "limit fast",
+        "mdr_dask.physics.wear.worn": "Worn",
+    },
+    "Lubricated line contact": {
+        "mdr_dask.physics.lubrication.line_contact": "line_contact solve_film",
+        "mdr_dask.physics.lubrication.film_formulas": "hertz_line dimensionless_groups moes_parameters",
+    },
+    "Oils": {"mdr_dask.physics.lubrication.oil": "Oil walther_constants pressure_viscosity log_viscosity"},
+    "Superposition": {"mdr_dask.physics.superposition.master_curve": "superpose Superposition rereference"},
 }
 
 
@@ -64,7 +49,7 @@ def api_page() -> str:
     parts = [_HEAD]
     for subject, rooms in PUBLIC.items():
         parts.append(f"## {subject}\n")
-        parts += [_entry(module, name) for module, names in rooms for name in names]
+        parts += [_entry(module, name) for module, names in rooms.items() for name in names.split()]
     return "\n".join(parts)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from mdr_dask.api import PUBLIC, api_page
 
-ROOMS = sorted({module for rooms in PUBLIC.values() for module, _ in rooms})
+ROOMS = sorted({module for rooms in PUBLIC.values() for module in rooms})
 
 
 def test_the_page_is_up_to_date():
@@ -17,7 +17,7 @@ def test_the_page_is_up_to_date():
 
 def test_every_subject_has_an_example():
     for subject, rooms in PUBLIC.items():
-        things = [getattr(import_module(module), name) for module, names in rooms for name in names]
+        things = [getattr(import_module(module), name) for module, names in rooms.items() for name in names.split()]
         assert all(thing.__doc__ for thing in things), subject
         assert any(">>>" in thing.__doc__ for thing in things), subject
 

@@ -43,13 +43,14 @@ def expand(
         paths: dict[str, Path] = {key: ("parameters", key) for key in spec.parameters}
         if spec.series:
             paths |= {key: ("series", name, key) for key in spec.series[name]}
-        expansion = _Expansion(document, model.parameters, spec, directory, paths)
+        data = {key: value_at(document.data, path) for key, path in paths.items()}
+        expansion = _Expansion(document, model.parameters, spec, directory, paths, data)
         series = expansion.series(name, model, outputs)
         if series is not None:
             found.append(series)
         units = model.units(series.parameters) if series else {}
         asked |= dict.fromkeys(expansion.remarks)
-        asked |= dict.fromkeys(questions(document, model.parameters, expansion.data, paths, units))
+        asked |= dict.fromkeys(questions(document, model.parameters, data, paths, units))
     return tuple(found), tuple(asked)
 
 
@@ -60,12 +61,8 @@ class _Expansion:
     spec: CampaignSpec
     directory: str
     paths: Mapping[str, Path]
-    data: dict[str, Any] = field(init=False)
+    data: dict[str, Any]
     remarks: list[str] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        data = {name: value_at(self.document.data, path) for name, path in self.paths.items()}
-        object.__setattr__(self, "data", data)
 
     def series(self, name: str, model: Model[Any], outputs: Sequence[str]) -> Series | None:
         """Return one series, or None if it has a problem."""
