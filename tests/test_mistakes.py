@@ -77,6 +77,13 @@ def test_numbers_without_units_are_asked_about_beside_other_problems():
     assert question.startswith("study.yaml:9:18: parameters.rms_roughness: 0.5 is read as 0.5 m: write '0.5 um'")
 
 
+@pytest.mark.parametrize("number", [".inf", ".nan", "1e999", "1" * 299])
+def test_numbers_of_any_size_are_refused_beside_other_problems(number):
+    text = CAMPAIGN.replace("0.5 um", number).replace("velocity: {", "velocity: {linear: [1, 2, 3], ")
+    with pytest.raises(CampaignError, match="expected one of the keys"):
+        loads(text, "study.yaml", ".")
+
+
 QUOTED = ("seed: 1", "realisations: 2", "points: 500", "hurst: 0.7")
 COUNT = "1 m/s, 4]"
 

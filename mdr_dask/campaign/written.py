@@ -12,6 +12,7 @@ from mdr_dask.campaign import fields
 from mdr_dask.campaign.document import Document, parse
 from mdr_dask.campaign.problems import Path, Problem, dotted
 from mdr_dask.campaign.variation import RANGES
+from mdr_dask.models.base import MOST
 from mdr_dask.units import is_doubtful, likely, unit_behind
 
 
@@ -47,7 +48,8 @@ def questions(
     for name, given in data.items():
         for field, at, value in _scalars(given, (name,), paths[name]):
             info = fields.field_at(parameters, field, data)
-            if info is None or field in asked or isinstance(value, bool) or not isinstance(value, int | float):
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if info is None or field in asked or not is_number or not abs(value) <= MOST:
                 continue
             unit = units.get(dotted(field), fields.unit_at(parameters, field, data) or "1")
             usual = fields.usual(info)
