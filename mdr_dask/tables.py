@@ -241,7 +241,7 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     names, units = _names_and_units(grid, head)
     _require_even(grid, rows, len(units), head)
     cells = _with_points(grid, rows)[:, : len(units)]
-    if not is_name and _ends_with_mean(cells, grid.number[rows]):
+    if names and not is_name and _ends_with_mean(cells, grid.number[rows]):
         notes = (f"{grid.lines[rows[-1]]}: the mean of the rows above", *notes)
         rows, stated, cells = rows[:-1], stated[:-1], cells[:-1]
     first = grid.lines[rows[0] if head.names is None else head.names]
