@@ -28,7 +28,7 @@ STEEP = {"hurst": 0.9, "normal_force": ZONE["normal_force"]}
 
 
 def zone(force, velocity):
-    return SLOPE * laws.zone_one(force, velocity, 0.35, 1.5)
+    return np.sqrt(2) * SLOPE * 1.5 * velocity * force**-0.35
 
 
 def plane(force, velocity):

@@ -26,16 +26,8 @@ def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -
 
 
 def alpha(hurst: Any) -> Any:
-    """Return the exponent alpha = H / (1 + H) of `zone_one` for the Hurst exponent H (eq. 3.13)."""
+    """Return the exponent alpha = H / (1 + H) of eq. 3.11 for the Hurst exponent H (eq. 3.13)."""
     return hurst / (1 + hurst)
-
-
-def zone_one(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
-    """Return mu / slope at low velocity and low force (eq. 3.11).
-
-    The arguments are `velocity_number`, `force_number`, and the constants alpha and beta of the law.
-    """
-    return math.sqrt(2) * beta * velocity * force**-exponent
 
 
 def full_contact(force: Any, velocity: Any) -> Any:
@@ -44,10 +36,11 @@ def full_contact(force: Any, velocity: Any) -> Any:
 
 
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
-    """Return mu / (sqrt 2 slope) for all velocities and forces (eq. 3.17, 3.18); arguments as in `zone_one`.
+    """Return mu / (sqrt 2 slope) for all velocities and forces (eq. 3.17, 3.18).
 
-    Three laws are combined by 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 = sqrt 2 slope is the plateau,
-    mu_2 follows from `full_contact`, and mu_3 follows from `zone_one`.
+    The arguments are `force_number`, `velocity_number`, and the constants alpha and beta of eq. 3.11. Three laws are
+    combined by 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 = sqrt 2 slope is the plateau, mu_2 follows
+    from `full_contact`, and mu_3 = sqrt 2 slope beta velocity force^-alpha is the law at low velocity and low force.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 
@@ -55,17 +48,6 @@ def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
 def crossover(force: Any, exponent: Any, beta: Any) -> Any:
     """Return the `velocity_number` at which the linear law for low velocities, extrapolated, reaches the plateau."""
     return np.hypot(force / 4, force**exponent / beta)
-
-
-def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[Any, Any]:
-    """Return two velocity numbers for eq. 3.18: at the end of region I, and at the start of region III.
-
-    Region I ends where mu is `share` times the value of the linear law. Region III begins where mu is `share` times the
-    plateau. The other arguments are those of `zone_one`.
-    """
-    width = math.sqrt(share**-2 - 1)
-    middle = crossover(force, exponent, beta)
-    return middle * width, middle / width
 
 
 def indenter_low(
