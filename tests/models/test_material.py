@@ -23,7 +23,7 @@ def test_every_kind_is_the_solid_it_names():
     kelvin = solid_of(material(kelvin={"shear_modulus": 1e6, "relaxation_time": 1e-3}))
     assert (kelvin.static_modulus, kelvin.viscosity) == (1e6, 1e3)
     standard = solid_of(material(standard_solid={"static_modulus": 1e6, "glass_modulus": 1e7, "relaxation_time": 0.1}))
-    assert standard.glass_modulus == 1e7
+    assert standard.static_modulus + standard.moduli.sum() == 1e7
     prony = solid_of(
         material(prony={"static_modulus": 1.0, "moduli": [1.0, 2.0], "times": [0.1, 1.0], "viscosity": 0.5})
     )
