@@ -336,6 +336,15 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     return (before * (1.0 if math.isclose(factor, 1.0) else factor), zero) if zero else (before * one, 0.0)
 
 
+def converts(given: str, unit: str) -> bool:
+    """Return whether a text is a unit that can be converted to another unit."""
+    try:
+        conversion(given, unit)
+    except ValueError:
+        return False
+    return bool(given)
+
+
 #: Coherent SI unit of each base dimension in `DEFINITIONS`.
 _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
 

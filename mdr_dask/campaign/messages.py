@@ -13,8 +13,7 @@ from pydantic_core import ErrorDetails
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.errors import did_you_mean, similar
-from mdr_dask.models.data_file import DataFile
-from mdr_dask.models.parts.named_by_file import NamedByFile
+from mdr_dask.models.data_file import DataFile, NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
 #: Function that adds a problem. Its arguments are the path in the data, the message, and a truth value: true if the key

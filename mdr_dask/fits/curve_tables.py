@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import JOINED, is_called, nearest
 from mdr_dask.tables import AGREE, decoded, numbers, read_sheet
-from mdr_dask.units import conversion, is_unit
+from mdr_dask.units import converts, is_unit
 
 if TYPE_CHECKING:
     from mdr_dask.physics.superposition.master_curve import Vertical
@@ -150,7 +150,7 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:
-        return any(_is(column, name) for name in names) or _has_unit(units.get(column, ""), unit)
+        return any(_is(column, name) for name in names) or converts(units.get(column, ""), unit)
 
     dynamic = is_one(over, "frequency", unit="rad/s") or is_one(over, "frequency", unit="Hz")
     if not (is_temperature(by, units.get(by, "")) and (dynamic or is_one(over, "time", unit="s"))):
@@ -158,14 +158,6 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
     if all(is_one(each, "modulus", "storage_modulus", "loss_modulus", unit="Pa") for each in ordinates):
         return "modulus"
     return "compliance" if all(is_one(each, "compliance", unit="1/Pa") for each in ordinates) else "none"
-
-
-def _has_unit(unit: str, wanted: str) -> bool:
-    try:
-        conversion(unit, wanted)
-    except ValueError:
-        return False
-    return unit not in ("", "1")
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
@@ -241,4 +233,4 @@ def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[
 
 def is_temperature(by: str, unit: str = "") -> bool:
     """Return whether a column contains temperatures, judged by its name or its unit."""
-    return _is(by, "temperature") or "temperature" in by.casefold() or _has_unit(unit, "K")
+    return _is(by, "temperature") or "temperature" in by.casefold() or converts(unit, "K")

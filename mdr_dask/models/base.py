@@ -270,6 +270,11 @@ class Block(Generic[P]):
         column[:] = [value] * self.cases
         return column
 
+    def numbers(self, name: str) -> FloatArray:
+        """Return the value of a parameter for every case; NaN for a case in which the parameter is not given."""
+        given = self.columns.get(name, np.full(self.cases, getattr(self.parameters, name)))
+        return np.asarray(given, dtype=np.float64)  # None becomes NaN
+
     def case(self, index: int) -> P:
         """Return the parameter set of one case."""
         case = self.parameters

@@ -9,9 +9,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError, similar
+from mdr_dask.models.base import Parameters
 from mdr_dask.tables import decoded, described
 
 #: Size limit in bytes. Larger files get no note about their columns.
@@ -86,3 +87,19 @@ def _find_file(value: Any, info: ValidationInfo) -> Any:
 
 #: A parameter that names a file, relative to the campaign file.
 NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_type=str)]
+
+
+class NamedByFile(Parameters):
+    """A parameter set with a field `file` or `files`.
+
+    If a user writes the name of a file alone, the other fields have their default values.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"bare_name": True})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_name(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        return {"files": [value]} if "files" in cls.model_fields else {"file": value}

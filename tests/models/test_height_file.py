@@ -110,8 +110,6 @@ def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
     assert ("lines of positions or row numbers are left out" in " ".join(remarks)) == (
         left_out and "xyz" not in layout and "preamble" not in layout
     )
-    if "preamble" in layout:
-        assert "lines before the heights" in " ".join(remarks)
     assert dimensions(DataFile.of(path)) == 2
 
 

@@ -31,7 +31,7 @@ def _groups(block: Block[EhlLineParameters]) -> Groups:
     """Return W, U and G of every case."""
 
     def lookup(name: str) -> FloatArray | None:
-        return None if getattr(block.parameters, name) is None else block.column(name).astype(np.float64)
+        return None if getattr(block.parameters, name) is None else block.numbers(name)
 
     return Groups(*groups(lookup))
 

@@ -56,11 +56,9 @@ class Table(Parameters):
         from mdr_dask.physics.mdr.revolution import check_table
 
         try:
-            columns = profile_columns(file)
+            check_table(*profile_columns(file))
         except DataError as problem:
             raise ValueError(str(problem)) from None
-        try:
-            check_table(*columns)
         except ValueError as problem:
             raise ValueError(f"{file.name}: {problem}") from None
         return file

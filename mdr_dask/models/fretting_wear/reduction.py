@@ -75,14 +75,6 @@ def has_tables(block: Block[FrettingWear]) -> bool:
     return any(isinstance(one, Pressed) for one in indenters(block))
 
 
-def _column(block: Block[FrettingWear], name: str) -> FloatArray:
-    """Return the value of a parameter for every case; NaN for a case in which the parameter is not given."""
-    if name not in block.columns:
-        value = getattr(block.parameters, name)
-        return np.full(block.cases, np.nan if value is None else float(value))
-    return np.array([np.nan if v is None else v for v in block.columns[name]], dtype=float)
-
-
 def _scatter(block: Block[FrettingWear]) -> FloatArray:
     """Return standard normal random numbers for friction, amplitude and wear coefficient, shape (realisations, 3)."""
     return np.array(
@@ -95,7 +87,7 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
     """Return log-normal random factors with the mean 1, shape (cases, realisations)."""
-    width = np.sqrt(np.log1p(_column(block, name) ** 2))[:, None]
+    width = np.sqrt(np.log1p(block.numbers(name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
 
 
@@ -127,19 +119,19 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
     if block.parameters.dimensionless:
         length = height = force = np.ones(block.cases)
         if not sliding:
-            level = (1.0 - widening) + widening * (_column(block, "stick_radius") ** n)[:, None]
+            level = (1.0 - widening) + widening * (block.numbers("stick_radius") ** n)[:, None]
     else:
-        modulus = _column(block, "contact_modulus")
+        modulus = block.numbers("contact_modulus")
         length, height = _first_contact(block, coefficient, n, modulus, messages)
         force = modulus * height * length
         if not sliding:
-            share = _column(block, "effective_shear_modulus") * _column(block, "amplitude")
-            level = 1.0 - widening * (share / (_column(block, "friction") * modulus * height))[:, None]
-        swept = 1.0 if sliding else 4.0 * _column(block, "amplitude")
-        rate = swept * _column(block, "wear_coefficient") * modulus
-        advance = advance * (rate / (length * _column(block, "hardness")))[:, None]
-    amount = _column(block, "path" if sliding else "cycles")
-    columns = (n, amount, _column(block, "xi"), length, height, force)
+            share = block.numbers("effective_shear_modulus") * block.numbers("amplitude")
+            level = 1.0 - widening * (share / (block.numbers("friction") * modulus * height))[:, None]
+        swept = 1.0 if sliding else 4.0 * block.numbers("amplitude")
+        rate = swept * block.numbers("wear_coefficient") * modulus
+        advance = advance * (rate / (length * block.numbers("hardness")))[:, None]
+    amount = block.numbers("path" if sliding else "cycles")
+    columns = (n, amount, block.numbers("xi"), length, height, force)
     n, amount, xi, length, height, force = (np.broadcast_to(c[:, None], level.shape) for c in columns)
     return Numbers(n, canonical(level), advance, canonical(amount * advance), xi, length, height, force), messages
 
@@ -157,7 +149,7 @@ def _first_contact(
     """
     from mdr_dask.physics.mdr import power_law_contact as contact
 
-    depth, force = _column(block, "depth"), _column(block, "normal_force")
+    depth, force = block.numbers("depth"), block.numbers("normal_force")
     if has_tables(block):
         length = np.full(block.cases, np.nan)
         bodies = indenters(block)

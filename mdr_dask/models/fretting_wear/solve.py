@@ -197,18 +197,12 @@ def _solve_plain(
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
     """Return the different columns of an array, and for every column its index among the different columns."""
-    if rows.shape[1] == 0:
-        return rows, np.zeros(0, dtype=np.intp)
-    order = np.lexsort(rows)
-    ordered = rows[:, order]
-    new = np.append(True, np.any(ordered[:, 1:] != ordered[:, :-1], axis=0))
-    back = np.empty(order.size, dtype=np.intp)
-    back[order] = np.cumsum(new) - 1
-    return ordered[:, new], back
+    columns, back = np.unique(rows, axis=1, return_inverse=True)
+    return columns, back.ravel()
 
 
 def _count(*parts: FloatArray) -> int:
-    return int(_distinct(np.stack([np.nan_to_num(part).ravel() for part in parts]))[0].shape[1])
+    return int(np.unique(np.stack([np.nan_to_num(part).ravel() for part in parts]), axis=1).shape[1])
 
 
 def _solve_each(

@@ -341,7 +341,7 @@ def operations(block: Block[MixedLubrication]) -> float:
     for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
         waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
         points_of[case] = 3 * LEAST_PER_WAVE * waves if points == "auto" else 1.5 * points
-    creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
+    creep = block.numbers("slide_roll_ratio") != 0
     of_case = 3e6 + np.where(creep, 60.0, 11.0) * points_of
     films = 6e7 * float(np.sum(block.column("film_formula") == "ehl"))
     keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]

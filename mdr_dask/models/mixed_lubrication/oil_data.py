@@ -15,7 +15,7 @@ from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants
 from mdr_dask.tables import read_sheet, read_table
-from mdr_dask.units import conversion, shown, shown_apart
+from mdr_dask.units import converts, shown, shown_apart
 
 _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
 
@@ -135,7 +135,7 @@ class _Fit(NamedTuple):
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     """Fit Walther's law to a table of viscosities; raise DataError if this is impossible."""
     text = file.read_text()
-    is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)
+    is_dynamic = any(converts(unit, "Pa s") for unit in read_sheet(text, file.name).units)
     viscous = Column("dynamic viscosity", "Pa s", above=0)
     if not is_dynamic:
         viscous = Column("kinematic viscosity", "m^2/s", above=0)
@@ -149,11 +149,3 @@ def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     except ValueError as problem:
         raise DataError(f"{file.name}: {problem}") from None
     return _Fit(temperature, constants, viscosity / kinematic_viscosity(temperature, *constants) - 1)
-
-
-def _is_dynamic(unit: str) -> bool:
-    try:
-        conversion(unit, "Pa s")
-    except ValueError:
-        return False
-    return True

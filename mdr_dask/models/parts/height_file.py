@@ -13,7 +13,7 @@ from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
 from mdr_dask.tables import numbers, read_sheet, read_table
-from mdr_dask.units import shown, to_si
+from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +75,7 @@ def read_map(file: DataFile, units: Units) -> Recorded:
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
     if file.name.lower().endswith(".npy"):
-        grid = _without_positions(file, _array(file), Units(), ())
+        grid = _without_positions(file, _array(file), Units())
     elif (channel := _channel(file)) is not None:
         grid = _of_channel(file, channel, units)
     else:
@@ -306,19 +306,17 @@ def _grid_of_text(file: DataFile) -> _Grid:
     if min(cells.shape) < LEAST_LINES:
         rows, columns = cells.shape
         raise DataError(f"{file.name}: expected a map, got {rows} rows of {columns} heights: write a scan as columns")
-    before = sum(bool(line.strip()) and line.lstrip()[0] not in "#%" for line in lines[:first])
-    remarks = [f"lines before the heights: {before}"] if before else []
-    grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated, tuple(remarks))
+    grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated)
     if words := int(np.count_nonzero(np.isnan(grid.rows))):
         remark = f"cells without a number count as missing points: {words}"
         return grid._replace(remarks=(*grid.remarks, remark))
     return grid
 
 
-def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks: tuple[str, ...]) -> _Grid:
+def _without_positions(file: DataFile, rows: FloatArray, stated: Units) -> _Grid:
     with file.in_errors():
-        heights, steps, found = positions.without_positions(rows)
-    return _Grid(heights, steps, stated, (*remarks, *found))
+        heights, steps, remarks = positions.without_positions(rows)
+    return _Grid(heights, steps, stated, remarks)
 
 
 def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int]) -> Units:
@@ -335,7 +333,7 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
     for line in head:
         words = [word for word in re.split(r"[\s:=,;()\[\]\"/\\#%]+", line) if word]
         names = {word.rstrip("s") for word in re.findall(r"[a-z]+", line.casefold())}
-        if len(words) < 2 or not _is_length(words[-1]):
+        if len(words) < 2 or not converts(words[-1], "m"):
             continue
         along, upwards = names & {"x", "y", "lateral", "position", "horizontal"}, names & {"z", "height", "value"}
         number = re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?", words[-2], re.IGNORECASE)
@@ -356,14 +354,6 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
     only = {key: next(iter(values)) for key, values in found.items()}
     spacing, spacing_y = (to_si(only[key], "m") if key in only else None for key in ("spacing", "spacing_y"))
     return Units(only.get("height", ""), only.get("position", ""), spacing, spacing_y)
-
-
-def _is_length(unit: str) -> bool:
-    try:
-        to_si(f"1 {unit}", "m")
-    except ValueError:
-        return False
-    return True
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import check_in_campaign
-from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve, vertical_factor
+from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, ModulusTable, one_curve, vertical_factor
 from mdr_dask.models.parts.temperature import Arrhenius, Law, ShiftFactors, Wlf
 from mdr_dask.units import shown
 
@@ -70,7 +70,6 @@ class PowerLaw(Parameters):
     )
 
 
-KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
 SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to stiffer than diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
@@ -78,7 +77,9 @@ LAWS = ("wlf", "arrhenius", "shift_factors")
 class Material(Parameters):
     """One linear viscoelastic material, with or without a temperature."""
 
-    alternatives: ClassVar[tuple[Alternatives, ...]] = (tuple((kind,) for kind in KINDS),)
+    alternatives: ClassVar[tuple[Alternatives, ...]] = (
+        (("kelvin",), ("standard_solid",), ("prony",), ("power_law",), ("dma_table",)),
+    )
     kelvin: Kelvin | None = Field(default=None, description="Kelvin body, a spring and a dashpot in parallel")
     standard_solid: StandardSolid | None = Field(
         default=None, description="standard solid, a spring and one Prony term in parallel"
@@ -110,9 +111,7 @@ class Material(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each(self, info: ValidationInfo) -> Material:
-        kinds = [kind for kind in KINDS if getattr(self, kind) is not None]
-        if len(kinds) != 1:
-            raise ValueError(f"expected one of {', '.join(KINDS)}, got {', '.join(kinds) or 'none'}")
+        self.require_one_alternative()
         laws = [law for law in LAWS if getattr(self, law) is not None]
         if len(laws) > 1:
             raise ValueError(f"expected one of {', '.join(LAWS)}, got {' and '.join(laws)}")
@@ -150,7 +149,7 @@ def _shift(material: Material) -> float | None:
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
-    own = None if material.dma_table is None else _curve(material.dma_table, law).temperature
+    own = None if material.dma_table is None else one_curve(material.dma_table, law).temperature
     return float(law.factor(temperature)) / (1.0 if own is None else float(law.factor(own)))
 
 
@@ -159,7 +158,7 @@ def _vertical(material: Material) -> float:
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
         return 1.0
-    own = _curve(table, material.law).temperature
+    own = one_curve(table, material.law).temperature
     return 1.0 if own is None else float(vertical_factor(table, np.array([temperature]), own)[0])
 
 
@@ -187,15 +186,10 @@ def _fit_of(material: Material) -> SeriesFit | None:
 
 
 @lru_cache(maxsize=64)
-def _curve(table: ModulusTable, law: Law | None) -> Moduli:
-    return one_curve(table, law)
-
-
-@lru_cache(maxsize=64)
 def _table_fit(table: ModulusTable, law: Law | None) -> SeriesFit:
     from mdr_dask.physics.solids import fit_series
 
-    moduli = _curve(table, law)
+    moduli = one_curve(table, law)
     return fit_series(moduli.omega, moduli.storage, moduli.loss, table.terms_per_decade)
 
 
@@ -229,7 +223,7 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
         return ()
     what, how = "power law", ""
     if material.dma_table is not None:
-        what, how = f"table {material.dma_table.file.name}", _curve(material.dma_table, material.law).superposed
+        what, how = f"table {material.dma_table.file.name}", one_curve(material.dma_table, material.law).superposed
     lowest, highest = fit.range
     errors = [f"{error:.1%} in {modulus}" for modulus, error in _errors(fit).items()]
     return (
@@ -243,7 +237,7 @@ def _table_notes(material: Material) -> tuple[str, ...]:
     table, temperature = material.dma_table, material.temperature
     if table is None:
         return ()
-    curve, notes = _curve(table, material.law), []
+    curve, notes = one_curve(table, material.law), []
     if temperature is not None and curve.temperature is not None and table.vertical != "none":
         notes.append(
             f"at other temperatures than {shown(curve.temperature, 'K')}, moduli are divided by "

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.models.base import quantity
-from mdr_dask.models.data_file import NamedFile, check_in_campaign
+from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
 from mdr_dask.models.parts.height_file import Scan, Units, read_scan
-from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.surface_files import doubts_of_line
 from mdr_dask.units import shown
 

@@ -15,8 +15,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, is_called, plain
 from mdr_dask.models.base import quantity
-from mdr_dask.models.data_file import NamedFile, check_in_campaign
-from mdr_dask.models.parts.named_by_file import NamedByFile
+from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
 from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Read, TableError, read_sheet, read_table
 from mdr_dask.units import shown
@@ -99,6 +98,7 @@ class Moduli:
     superposed: str = ""
 
 
+@lru_cache(maxsize=64)
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the shear moduli of a table at one temperature.
 

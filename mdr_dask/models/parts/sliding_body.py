@@ -91,24 +91,18 @@ class SlidingBody(Parameters):
 
     @model_validator(mode="after")
     def _one_body_and_one_line(self) -> SlidingBody:
-        problem = self._problem_of_line()
-        if problem:
-            raise ValueError(problem)
+        both = [name for name in GENERATED if getattr(self, name) is not None]
+        if self.surface is None:
+            if self.hurst is None:
+                raise ValueError("expected hurst, because generated roughness needs it, got none")
+        elif both:
+            raise ValueError(f"surface replaces {', '.join(both)}: leave out one or the other")
+        elif self.surface.profile is not None and self.length is not None:
+            raise ValueError("the length of surface: {profile: ...} comes from its file: leave out length")
+        elif self.surface.profile is None and self.length is None:
+            raise ValueError("expected length, the length of the rough line that represents the surface, got none")
         self.require_one_alternative()
         return self
-
-    def _problem_of_line(self) -> str:
-        """Return a message if parameters of the line are missing or contradictory; otherwise return an empty string."""
-        if self.surface is None:
-            return "" if self.hurst is not None else "expected hurst, because generated roughness needs it, got none"
-        both = [name for name in GENERATED if getattr(self, name) is not None]
-        if both:
-            return f"surface replaces {', '.join(both)}: leave out one or the other"
-        if self.surface.profile is not None and self.length is not None:
-            return "the length of surface: {profile: ...} comes from its file: leave out length"
-        if self.surface.profile is None and self.length is None:
-            return "expected length, the length of the rough line that represents the surface, got none"
-        return ""
 
     def largest_force(self) -> float:
         """Return the largest normal force in N."""

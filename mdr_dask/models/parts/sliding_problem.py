@@ -104,7 +104,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
     faults: dict[int, str] = {}
     lines, which_line, length, height = _lines(block, faults)
     static, viscosity, terms, which_solid = _solids(block, faults)
-    velocity, force = (np.asarray(block.column(name), dtype=np.float64) for name in ("velocity", "normal_force"))
+    velocity, force = map(block.numbers, ("velocity", "normal_force"))
     with np.errstate(all="ignore"):
         loads = canonical(force / (4 * static * length * height))
         deborah = canonical(velocity * viscosity / length)
@@ -171,27 +171,18 @@ def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
     return [getattr(block.case(int(j)), name) for j in first], which
 
 
-def _numbers(block: Block[Any], name: str) -> FloatArray:
-    """Return the value of a parameter for every case, NaN if the parameter is not given."""
-    if name not in block.columns:
-        value = getattr(block.parameters, name)
-        return np.full(block.cases, np.nan if value is None else value, dtype=np.float64)
-    column = block.columns[name]
-    return column.astype(np.float64)  # None becomes NaN
-
-
 def _lines(
     block: Block[Any], faults: dict[int, str]
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
     """Return the different lines, and for every case the index of its line, its length and its height."""
-    length, height = _numbers(block, "length"), _numbers(block, "rms_roughness")
+    length, height = block.numbers("length"), block.numbers("rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
     with np.errstate(all="ignore"):
-        ends = [canonical(length / _numbers(block, name)) for name in ("rolloff_wavelength", "longest_wavelength")]
+        ends = [canonical(length / block.numbers(name)) for name in ("rolloff_wavelength", "longest_wavelength")]
     corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 if no wavelength limit is given
     surfaces, which_surface = each(block, "surface")
-    columns = _numbers(block, "hurst"), _numbers(block, "points").astype(np.int64), *corners
+    columns = block.numbers("hurst"), block.numbers("points").astype(np.int64), *corners
     own_length = [length] if any(surface is not None for surface in surfaces) else []
     first, which = combinations(which_surface, flat, *columns, *own_length)
     lines: list[Roughness | None] = []
@@ -222,7 +213,7 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
     The solids are the Prony terms of every different solid (moduli over static modulus, and times in s), None for a
     Kelvin solid. The last array is the index of the solid of every case.
     """
-    static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
+    static, viscosity = block.numbers("shear_modulus"), block.numbers("relaxation_time")
     materials, which = each(block, "material")
     terms: list[Any] = [None] * len(materials)
     for k, material in enumerate(materials):

@@ -10,9 +10,8 @@ from pydantic import Field
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import quantity
-from mdr_dask.models.data_file import DataFile, NamedFile
+from mdr_dask.models.data_file import DataFile, NamedByFile, NamedFile
 from mdr_dask.models.parts.height_file import Scan, Units, read_map, read_scan
-from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import matched, read_sheet, read_table
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -12,7 +11,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
-from mdr_dask.models.data_file import NamedFile, check_in_campaign
+from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
 from mdr_dask.tables import read_table
 from mdr_dask.units import shown_apart
 
@@ -50,17 +49,12 @@ class Arrhenius(Parameters):
         return arrhenius_factor(temperature, self.reference, self.activation_energy)
 
 
-class ShiftFactors(Parameters):
+class ShiftFactors(NamedByFile):
     """Measured shift factors, given by a file name or by `file: name`."""
 
     file: NamedFile = Field(
         description="table with the columns temperature, and a_T or log10 a_T; a_T must pass through 1"
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare_name(cls, value: Any) -> Any:
-        return {"file": value} if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _holds_factors(self, info: ValidationInfo) -> ShiftFactors:

@@ -76,7 +76,7 @@ def compute(block: Block[VelocityJump]) -> Result:
     result = Result(values, np.full(shape, Status.FAILED, np.int8))
     problems, solves = sliding_problems(block), 0
     with np.errstate(all="ignore"):
-        after = np.abs(1 + np.asarray(block.column("velocity_change"), dtype=np.float64))
+        after = np.abs(1 + block.numbers("velocity_change"))
     refuse_immense({"v_2 / v_1": np.where(after == 0, 1, after)}, problems.faults)
     for j in np.flatnonzero(after == 1):
         problems.faults.setdefault(
@@ -217,7 +217,7 @@ class _Marched(_Group):
         They are sorted by velocity, because the solver shares work among neighbours with equal Deborah numbers.
         """
         before = self.problems.deborah[self.members]
-        change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
+        change = self.block.numbers("velocity_change")[self.members]
         after, loads = before * (1 + change), self.problems.loads[self.members]
         first, which = combinations(before, after, loads)
         return loads[first], np.column_stack([before, after])[first], which
