@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from mdr_dask.models.base import Parameters, quantity, unquoted
+from mdr_dask.models.base import Parameters, Whole, quantity
 from mdr_dask.models.data_file import NamedFile
 
 _LONGEST_NAME = 100  # file systems allow 255 bytes, and endings are added to the name
@@ -35,8 +35,8 @@ class ToleranceSpec(Parameters):
 class AdaptiveSpec(Parameters):
     """A number of realisations that grows for each case until its standard errors are small enough."""
 
-    at_least: int = Field(20, ge=2, description="number of realisations that every case gets")
-    at_most: int = Field(description="largest number of realisations that a case may get", ge=2)
+    at_least: Whole = Field(20, ge=2, description="number of realisations that every case gets")
+    at_most: Whole = Field(description="largest number of realisations that a case may get", ge=2)
     until: dict[str, float | str | ToleranceSpec] = Field(
         min_length=1,
         description="largest accepted standard error of each named output: 1 %, or {relative: 1 %, absolute: 2 um}. A "
@@ -52,7 +52,7 @@ class RefinedSpec(Parameters):
         description="largest interpolation error: 1 % of the largest value of the first output, or for each "
         "named output: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
     )
-    at_most: int = Field(
+    at_most: Whole = Field(
         60,
         ge=5,
         le=10**4,
@@ -63,7 +63,7 @@ class RefinedSpec(Parameters):
 class SobolSpec(Parameters):
     """Cases drawn as a scrambled Sobol sequence."""
 
-    sobol: int = Field(
+    sobol: Whole = Field(
         ge=1, le=10**6, description="number of cases, drawn from the ranges as a scrambled Sobol sequence"
     )
 
@@ -71,7 +71,7 @@ class SobolSpec(Parameters):
 class LatinHypercubeSpec(Parameters):
     """Cases drawn as a Latin hypercube."""
 
-    latin_hypercube: int = Field(
+    latin_hypercube: Whole = Field(
         ge=1,
         le=10**6,
         description="number n of cases, drawn as a Latin hypercube: one case in each of n intervals of every range",
@@ -81,7 +81,7 @@ class LatinHypercubeSpec(Parameters):
 class SaltelliSpec(Parameters):
     """Cases drawn as the design of Saltelli for Sobol indices."""
 
-    saltelli: int = Field(
+    saltelli: Whole = Field(
         ge=2,
         le=10**5,
         description="number n of base points of the design of Saltelli for `mdr-dask sensitivity`; d varied parameters "
@@ -120,7 +120,7 @@ Sampling = Annotated[
 ]  # fmt: skip
 
 Realisations = Annotated[
-    Annotated[int, Field(ge=1), Tag("number")] | Annotated[AdaptiveSpec, Tag("mapping")],
+    Annotated[Whole, Field(ge=1), Tag("number")] | Annotated[AdaptiveSpec, Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict | AdaptiveSpec) else "number"),
 ]
 
@@ -133,7 +133,7 @@ class StoreSpec(Parameters):
         min_length=1,
         description="path or URL of the Zarr store that receives the results; by default results/<name>.zarr",
     )
-    blocks: dict[str, Annotated[int, BeforeValidator(unquoted), Field(ge=1)]] = Field(
+    blocks: dict[str, Annotated[Whole, Field(ge=1)]] = Field(
         default_factory=dict,
         description="number of values in a chunk, along an axis or along realisation; chosen automatically by default",
     )
@@ -153,7 +153,7 @@ class CampaignSpec(Parameters):
 
     name: FileName = Field(description="name of the campaign, and of its store unless store gives another path")
     model: str = Field(description="name of the model that computes the results")
-    seed: int = Field(0, ge=0, description="seed of all random numbers; the same seed gives the same results")
+    seed: Whole = Field(0, ge=0, description="seed of all random numbers; the same seed gives the same results")
     realisations: Realisations = Field(
         1, description="number of random samples of each case, such as independent rough lines of the same statistics"
     )

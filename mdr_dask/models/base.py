@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import lru_cache, partial, reduce
+from functools import partial, reduce
 from importlib import import_module
-from typing import Any, ClassVar, Generic, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
@@ -37,6 +37,10 @@ def unquoted(value: Any) -> Any:
     return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
 
 
+#: A whole number, which may be in quotes, because numbers with a unit are written in quotes, too.
+Whole = Annotated[int, BeforeValidator(unquoted)]
+
+
 class Parameters(BaseModel):
     """Base class of every parameter set. The numbers are in SI units, and their bounds are checked.
 
@@ -58,14 +62,6 @@ class Parameters(BaseModel):
     settings: ClassVar[frozenset[str]] = frozenset()
     requires: ClassVar[Mapping[str, tuple[str, str]]] = {}
 
-    @model_validator(mode="before")
-    @classmethod
-    def _whole_numbers_in_quotes(cls, data: Any) -> Any:
-        """Convert whole numbers in quotes, because numbers with a unit are written in quotes, too."""
-        if not isinstance(data, dict):
-            return data
-        return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
-
     def require_one_alternative(self) -> None:
         """Raise ValueError unless exactly one member of each group of alternatives is given."""
         for group in self.alternatives:
@@ -77,16 +73,6 @@ class Parameters(BaseModel):
     def inactive(self) -> dict[str, str]:
         """The parameters that have no effect, each with the parameter that overrides it."""
         return {other: name for name, other in self.overrides.items() if getattr(self, name) not in (None, ())}
-
-
-@lru_cache(maxsize=256)
-def _whole_fields(kind: type[BaseModel]) -> frozenset[str]:
-    """Return the fields of a parameter set that accept a whole number."""
-    return frozenset(name for name, info in kind.model_fields.items() if _may_be_whole(info.annotation))
-
-
-def _may_be_whole(annotation: Any) -> bool:
-    return annotation is int or any(map(_may_be_whole, get_args(annotation)))
 
 
 def describe(group: Alternatives) -> str:
@@ -115,12 +101,10 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
         """Convert a text such as ``20 mm`` to SI by the converter in the context; keep names such as ``auto``."""
-        if info.context is None:
-            return value
-        convert = info.context["to_si"]
         if isinstance(value, list | tuple):
-            return tuple(convert(item, unit) if _looks_numeric(item) else item for item in value)
-        return convert(value, unit) if _looks_numeric(value) else value
+            return tuple(to_si(item, info) for item in value)
+        value = unquoted(value)
+        return info.context["to_si"](value, unit) if info.context and _looks_numeric(value) else value
 
     examples = usual.split(", ") if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 SAME = 0.01
 """Relative difference up to which two lengths count as equal, because numbers in files are rounded."""
-LEAST_LINES = 3
-"""A table of heights counts as a map if it has at least this many rows and columns."""
 MOST_COLUMNS = 6
 """A file with at most this many columns holds a line scan or a table of x, y and z; a map has more columns."""
 
@@ -40,13 +38,6 @@ class Units(NamedTuple):
     position: str = ""
     spacing: float | None = None
     spacing_y: float | None = None
-
-
-class Recorded(NamedTuple):
-    """A recorded map with NaN for missing points, and remarks on how the map was read."""
-
-    surface: SurfaceMap
-    remarks: tuple[str, ...]
 
 
 class Scan(NamedTuple):
@@ -66,11 +57,11 @@ class _Grid(NamedTuple):
     remarks: tuple[str, ...] = ()
 
 
-def read_map(file: DataFile, units: Units) -> Recorded:
-    """Return the heights of a map from a text, an array of numpy, or a format of SurfaceTopography.
+def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]:
+    """Return a map from a text, an array of numpy, or a format of SurfaceTopography, and remarks on how it was read.
 
-    `units` are those that the user states. Rows of text and npy files run along x and are stacked along y. Raise
-    DataError if a unit or spacing is missing, or if the file and the user state different ones.
+    Missing points are NaN. `units` are those that the user states. Rows of text and npy files run along x and are
+    stacked along y. Raise DataError if a unit or spacing is missing, or if the file and the user state different ones.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -83,7 +74,7 @@ def read_map(file: DataFile, units: Units) -> Recorded:
     metre, steps_m = _settled(file, grid, units)
     height, remarks = positions.without_codes(grid.rows.T * metre)
     size = height.shape[0] * steps_m[0], height.shape[1] * steps_m[1]
-    return Recorded(SurfaceMap(height, size), (*grid.remarks, *remarks))
+    return SurfaceMap(height, size), (*grid.remarks, *remarks)
 
 
 def read_scan(file: DataFile, units: Units) -> Scan:
@@ -303,7 +294,7 @@ def _grid_of_text(file: DataFile) -> _Grid:
     stated = _stated(file, lines[:first], lines[first], cells.shape)
     if cells.shape[1] <= MOST_COLUMNS < len(cells):
         return _scattered(file, lines, first, cells, stated)
-    if min(cells.shape) < LEAST_LINES:
+    if min(cells.shape) < 3:
         rows, columns = cells.shape
         raise DataError(f"{file.name}: expected a map, got {rows} rows of {columns} heights: write a scan as columns")
     grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,8 +9,6 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.units import shown
 
-OFF_GRID = 0.5
-"""Largest distance of a position from its grid point, in steps of the grid."""
 OUTER = 3
 """Largest number of rows or columns on each side of a table that may hold positions or row numbers."""
 BREAK = 3.0
@@ -24,17 +20,6 @@ FEW_LEVELS = 10
 """Heights with at most this many different values belong to a designed surface, such as a grating."""
 
 
-class Outer(NamedTuple):
-    """A table of heights without the rows and columns of positions, which `remarks` name.
-
-    `steps` are the steps of the positions along x and y, None if unknown.
-    """
-
-    rows: FloatArray
-    steps: tuple[float | None, float | None]
-    remarks: tuple[str, ...]
-
-
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
     """Return, for each line, whether its numbers only rise or only fall, as positions and row numbers do."""
     steps = np.diff(lines, axis=1)
@@ -43,13 +28,14 @@ def rising(lines: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(one_way & (2 * np.count_nonzero(known & (steps != 0), axis=1) > steps.shape[1]))
 
 
-def without_positions(rows: FloatArray) -> Outer:
-    """Remove the outermost rows and columns that hold positions or row numbers.
+def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None, float | None], tuple[str, ...]]:
+    """Remove the outermost rows and columns that hold positions or row numbers, which the returned remarks name.
 
-    Raise DataError if positions are not equidistant, or if several lines of positions have different steps.
+    Also return the steps of the positions along x and y, None if unknown. Raise DataError if positions are not
+    equidistant, or if several lines of positions have different steps.
     """
     if min(rows.shape) < 4 * OUTER:
-        return Outer(rows, (None, None), ())
+        return rows, (None, None), ()
     edges = [(_leading(lines), _leading(lines[::-1])) for lines in (rows, rows.T)]
     (top, bottom), (left, right) = edges
     inner = slice(top, rows.shape[0] - bottom), slice(left, rows.shape[1] - right)
@@ -59,7 +45,7 @@ def without_positions(rows: FloatArray) -> Outer:
         steps.append(_common_step([lines[place, along] for place in places], name))
         left_out += [f"{name} {place + 1}" for place in places]
     remarks = (f"lines of positions or row numbers are left out: {', '.join(left_out)}",) if left_out else ()
-    return Outer(rows[inner], (steps[0], steps[1]), remarks)
+    return rows[inner], (steps[0], steps[1]), remarks
 
 
 def _leading(lines: FloatArray) -> int:
@@ -112,7 +98,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     step, origin = np.polyfit(place, middles, 1)
     nearest = np.rint((positions - origin) / step)
     own = np.repeat(place, [line.size for line in lines])
-    if np.any(np.abs(known - origin - own * step) >= OFF_GRID * step):
+    if np.any(np.abs(known - origin - own * step) >= 0.5 * step):
         raise DataError("expected positions on a regular grid")
     return np.asarray(nearest - nearest.min(), dtype=np.int64), float(step)
 
