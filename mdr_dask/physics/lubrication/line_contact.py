@@ -31,8 +31,6 @@ ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
 #: Number of nodes of the two grids whose solutions only give the density of nodes for the grids of `NODES`.
 ADAPTED_NODES = 161
-
-
 #: Attempts at the first solution: factor of the expected film, largest film over the square of the inlet position,
 #: number of nodes, and step limits of Newton's method. The second attempt is slow but hardly ever fails.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
@@ -42,7 +40,7 @@ PACES = (Pace(0.12, 16), Pace(0.03, 250))
 PLACED = 0.1
 #: The stated error of a profile at a position is the largest error within this number of cells of the coarser grid.
 REACH = 2.0
-
+NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
 Reading = Callable[[GridSolution], float | FloatArray]
@@ -191,8 +189,7 @@ class LineSolution:
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
         if not np.isfinite(position[-1]):
-            none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
-            return none, none
+            return NO_ESTIMATE, NO_ESTIMATE
         before, after = cell_around(grid.nodes, position[-1])
         moved, risen = (np.inf if each.size < 2 else float(max(each[-1], 0.5 * each[-2])) for each in changes)
         errors = moved + (after - before), SAFETY * risen if grid.resolves_spike else np.inf
@@ -224,12 +221,7 @@ def _error(values: Sequence[FloatArray]) -> FloatArray:
 
 
 def _solve_on(
-    case: LineContact,
-    nodes: FloatArray,
-    pressure: FloatArray,
-    central: float,
-    pace: Pace,
-    spacing: float = np.nan,
+    case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, pace: Pace, spacing: float = np.nan
 ) -> tuple[Outcome, GridSolution]:
     """Solve on one grid from a guess of the pressure at its nodes."""
     grid = Grid.of(nodes)
@@ -345,7 +337,6 @@ def solve_film(
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution) -> LineSolution:
     """Return a solution without a film, with the reason."""
-    none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g} on {failed.nodes.size} nodes: {why}"
-    return LineSolution(case, outcome, reason, (), none, none)
+    return LineSolution(case, outcome, reason, (), NO_ESTIMATE, NO_ESTIMATE)

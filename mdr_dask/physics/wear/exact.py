@@ -30,6 +30,7 @@ from mdr_dask.physics.wear.worn import (
     worn_by,
     worn_height,
     worn_image,
+    worn_volume,
 )
 
 COARSEST = 2e-3
@@ -309,7 +310,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
         high = min(1.5 * high, profile.largest_radius)
     scar = virgin._replace(radius=bisect(excess, border, high))
     force = 2.0 * (virgin_load(profile, c) + eta * load)
-    return worn_by(profile, scar, border, scar.radius, depth, force)
+    return worn_by(profile, scar, border, scar.radius, depth, force, worn_volume(scar))
 
 
 def _contact(leg: _Leg, time: float) -> Worn:

@@ -53,19 +53,6 @@ class Quadrature(NamedTuple):
     cuts: FloatArray
 
 
-class Bracket(NamedTuple):
-    """Interval that contains the root of a falling function: its ends, and the values of the function at the ends.
-
-    `newer` is the end that was replaced last: -1 the lower one, 1 the higher one, 0 neither.
-    """
-
-    low: float
-    low_value: float
-    high: float
-    high_value: float
-    newer: int = 0
-
-
 def limit_radius(profile: Profile, stick_radius: float) -> float:
     """Return a(c), the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10)."""
     check_stick_radius(stick_radius)
@@ -153,29 +140,10 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
         return np.asarray(profile.image_slope(x) * np.where(x <= 1.0, inside, rest - 1.0))
 
     scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
-    worn = worn_by(profile, scar, c, edge, 1.0, force)
+    worn = worn_by(profile, scar, c, edge, 1.0, force, volume)
     # the wear law gives the energy of the limiting profile; the fast rule does not determine the dissipated energy
     energy = volume if rest == 0.0 else np.nan
-    return replace(worn, wear_volume=volume, energy_volume=energy, relative_error=ERROR)
-
-
-@jit_inline
-def _between(bracket: Bracket) -> float:
-    """Return the root of the straight line through the values at both ends."""
-    low, low_value, high, high_value, _ = bracket
-    return (low * high_value - high * low_value) / (high_value - low_value)
-
-
-@jit_inline
-def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
-    """Return the bracket with one end replaced by x, with the rule of Anderson and Björck."""
-    low, low_value, high, high_value, newer = bracket
-    before = low_value if value > 0.0 else high_value
-    share = 1.0 - value / before
-    share = share if share > 0.0 else 0.5
-    if value > 0.0:
-        return Bracket(x, value, high, share * high_value if newer == -1 else high_value, -1)
-    return Bracket(low, share * low_value if newer == 1 else low_value, x, value, 1)
+    return replace(worn, energy_volume=energy, relative_error=ERROR)
 
 
 @jit_inline
@@ -251,16 +219,29 @@ def _angle(x: float, radius: float) -> float:
 
 
 @jit
-def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
-    """Return the radius in a bracket at which `_scar_integral` vanishes, or the upper end if there is none."""
-    if not bracket.high_value < 0.0 < bracket.low_value:
-        return bracket.high
+def _scar_radius(
+    rule: Rule, low: float, low_value: float, high: float, high_value: float, quadrature: Quadrature
+) -> float:
+    """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is none.
+
+    The values are those of the integral at both ends. The method is that of Anderson and Björck: the false position,
+    with a smaller value at an end that was not replaced in two successive steps.
+    """
+    if not high_value < 0.0 < low_value:
+        return high
     error = END if rule.rest == 0.0 else SCAR
-    radius = _between(bracket)
+    radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
     for _ in range(100):
-        value = _scar_integral(rule, radius, 0, quadrature)
-        bracket, last = _narrowed(bracket, radius, value), radius
-        radius = _between(bracket)
+        value, last = _scar_integral(rule, radius, 0, quadrature), radius
+        share = 1.0 - value / (low_value if value > 0.0 else high_value)
+        share = share if share > 0.0 else 0.5
+        if value > 0.0:
+            high_value *= share if replaced < 0 else 1.0
+            low, low_value, replaced = radius, value, -1
+        else:
+            low_value *= share if replaced > 0 else 1.0
+            high, high_value, replaced = radius, value, 1
+        radius = (low * high_value - high * low_value) / (high_value - low_value)
         if abs(value) < error * rule.eta or abs(radius - last) < 4e-16 * radius:
             break
     return radius
@@ -277,7 +258,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
             return np.nan
         low, low_value, high = high, high_value, min(1.5 * high, largest)
         high_value = _scar_integral(rule, high, 0, quadrature)
-    return _scar_radius(rule, Bracket(low, low_value, high, high_value, 0), quadrature)
+    return _scar_radius(rule, low, low_value, high, high_value, quadrature)
 
 
 @jit
@@ -288,7 +269,7 @@ def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, f
     radius = limit
     if rule.rest > 0.0:
         first, last = _scar_integral(rule, 1.0, 0, quadrature), _scar_integral(rule, limit, 0, quadrature)
-        radius = _scar_radius(rule, Bracket(1.0, first, limit, last, 0), quadrature)
+        radius = _scar_radius(rule, 1.0, first, limit, last, quadrature)
     volume = 4.0 * _scar_integral(rule, radius, 1, quadrature)
     load, worn = _sticking_load(rule, abscissa, weight), 0.0
     for piece in range(4 if rule.rest > 0.0 else 0):  # in the limiting profile, the slip zone carries no load

@@ -219,7 +219,9 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
     return stress
 
 
-def worn_by(profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float) -> Worn:
+def worn_by(
+    profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float, wear_volume: float
+) -> Worn:
     """Return the worn contact for a scar, if the contact sticks up to `border` and carries load up to `edge`."""
     slipping = scar.border + (scar.radius - scar.border) * np.linspace(0.0, 1.0, 201)[1:-1]
     return Worn(
@@ -227,7 +229,7 @@ def worn_by(profile: Profile, scar: Scar, border: float, edge: float, depth: flo
         stick_border=border,
         depth=depth,
         normal_force=normal_force,
-        wear_volume=worn_volume(scar),
+        wear_volume=wear_volume,
         worn_depth=float(np.max(worn_height(scar, slipping), initial=0.0)),
         height=worn_profile(profile, scar),
         image=worn_image(profile, scar),
