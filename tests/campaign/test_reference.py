@@ -34,8 +34,8 @@ def test_schema_accepts_valid_files(validator, path):
     assert not [error.message for error in validator.iter_errors(plain(path.read_text()))]
 
 
-WITHOUT_UNITS = """unknown_key unknown_nested_key hurst_above_one empty_axis unknown_model missing_keys unknown_output
-range_count_of_half range_misspelt unknown_sampling misspelt_shape number_or_word series_empty"""
+WITHOUT_UNITS = """many unknown_nested_key empty_axis missing_keys range_count_of_half range_misspelt unknown_sampling
+misspelt_shape number_or_word series_empty"""
 
 
 @pytest.mark.parametrize("name", WITHOUT_UNITS.split())
