@@ -38,7 +38,7 @@ def test_one_kind_and_one_law_only():
     solid = {"static_modulus": 1e6, "glass_modulus": 1e7, "relaxation_time": 0.1}
     with pytest.raises(ValidationError, match=r"expected kelvin, or standard_solid, .* got none"):
         material()
-    with pytest.raises(ValidationError, match="got kelvin, standard_solid"):
+    with pytest.raises(ValidationError, match="got kelvin and standard_solid"):
         material(kelvin=kelvin, standard_solid=solid)
     with pytest.raises(ValidationError, match="expected a temperature together with one of wlf"):
         material(kelvin=kelvin, temperature=300.0)
