@@ -58,12 +58,15 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: the mean of the absolute errors, which need not cancel."""
+    """Return the discretisation error of the mean: the mean of the absolute errors, because errors need not cancel."""
     return mean(abs(error))
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the bootstrap interval of the mean with its discretisation error, along the new dimension ``bound``."""
+    """Return the ends of the bootstrap interval of the mean, along the new dimension ``bound``.
+
+    The interval includes the discretisation error of the mean.
+    """
     count = array.sizes["realisation"]
     if error is not None:
         array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
@@ -72,10 +75,10 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 
 
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
-    """Return the mean and both ends of its `interval`.
+    """Return the mean, and both ends of the interval of the mean (see `interval`).
 
-    If the scatter is unknown, for example with one realisation, the ends are the mean minus and plus its discretisation
-    error, or NaN.
+    If the scatter is unknown, for example with one realisation, the interval is the mean plus or minus the
+    discretisation error. If this error is unknown too, both ends are NaN.
     """
     known = (array,) if error is None else xr.broadcast(array, abs(error))
     found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
@@ -107,9 +110,10 @@ def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return the ends of intervals, shape (..., 2), from `count` realisations along the last axis.
+    """Return the ends of the 95 % intervals of means, shape (..., 2).
 
-    If the discretisation error of the mean is known, it is one further entry at the end of this axis.
+    Along the last axis of `values` are `count` realisations and then, if it is known, the discretisation error of the
+    mean.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
@@ -179,7 +183,7 @@ def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
-    """Reduce a group of a store over its realisations, to variables ``<output>_<statistic>``.
+    """Return statistics over the realisations of a group of a store, as variables ``<output>_<statistic>``.
 
     If the arrays are lazy, the result is lazy.
     """

@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 #: `PAUSE`: seconds between two plain lines. `LIVE_PAUSE`: seconds between two updates of the live line.
 PAUSE, LIVE_PAUSE = 5.0, 0.5
 
-#: Function that draws the latest progress, the elapsed time, and the time since the progress changed, in s.
+#: Function that draws the latest progress. Its other arguments are two times in s: the time since the start, and the
+#: time since the last change of the progress.
 Draw = Callable[["Progress | None", float, float], None]
 
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield the function that receives the progress of a run; the latest progress is shown at regular times."""
+    """Yield a function that receives the progress of a run, and show the latest progress at regular intervals."""
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:
@@ -120,8 +121,8 @@ def _write(line: str) -> None:
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
 
-    The remaining time counts down while no block ends; once it has run out, the blocks are slower than the last ones,
-    and no time is stated.
+    The remaining time counts down while no block ends; if the count reaches zero before the next block ends, the line
+    states no remaining time.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

@@ -1,8 +1,9 @@
 """Bootstrap intervals from the scatter of realisations and from the discretisation errors of results.
 
-A *stack* is an array with three kinds of rows: first the mean, then `RESAMPLES` means of resampled realisations, then
-the mean shifted by its discretisation errors. A fit is applied to every row, and `interval` computes the interval of a
-constant from the stack of fitted constants. A resample that contains only failed realisations is NaN.
+A *stack* is an array with three kinds of rows, in this order: one row with the mean; `RESAMPLES` rows with means of
+resampled realisations; and rows in which the mean is shifted by its discretisation errors. A fit is applied to every
+row, and `interval` computes the interval of a constant from the stack of fitted constants. The row of a resample that
+contains only failed realisations is NaN.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ def weights(count: int) -> FloatArray:
 
 
 def means(values: FloatArray) -> FloatArray:
-    """Return the stack of means over the first axis (realisations), without the values that are not finite.
+    """Return the stack of means over the first axis (realisations); values that are not finite are left out.
 
-    With one finite value, the resamples are NaN.
+    If there are fewer than two finite values, the means of the resamples are NaN.
     """
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
@@ -63,9 +64,10 @@ def complete(values: FloatArray) -> FloatArray:
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values shifted up and down by their errors, in two rows for each group of neighbouring values.
+    """Return two rows for each group of neighbouring values: with this group shifted up, and with it shifted down.
 
-    A value with an infinite error is shifted by its own absolute value.
+    A value is shifted by its error, or by its own absolute value if the error is infinite. The values of all other
+    groups are not shifted.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -83,9 +85,9 @@ def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the stack of the difference of two stacks with the same resamples.
+    """Return the stack of `one` minus `other`; both stacks must have the same resamples.
 
-    Its shifted rows contain first the errors of `one`, then those of `other`.
+    In the last rows, the difference is shifted first by the errors of `one`, then by the errors of `other`.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -101,25 +103,26 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum of the largest upward shifts of all groups; the rows are two shifts for each group."""
+    """Return the sum, over all groups, of the larger upward shift; `shifts` has two rows for each group."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack whose shifted rows each shift a group of neighbouring cases, instead of a single case."""
+    """Return a stack with new shifted rows; each shifts a group of neighbouring cases instead of a single case."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)
 
 
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Return 95 % intervals from a stack, along its first axis; with `positive`, computed in logarithms.
+    """Return the ends of 95 % intervals from a stack; with `positive`, they are computed from logarithms.
 
-    With few realisations, the percentiles of a bootstrap lie too close to the value. Their distances from the value are
-    therefore multiplied by `widening` for the number `count` of realisations. The shifts by discretisation errors are
-    added linearly, because an error that is the same in every realisation does not average out.
+    With few realisations, the percentiles of the resamples lie too close to the value in the first row. Their distances
+    from this value are therefore multiplied by `widening` for the number `count` of realisations. The shifts by
+    discretisation errors are added linearly, because an error that is the same in every realisation does not average
+    out.
     """
     values = logarithms(stack) if positive else stack
     enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
@@ -135,7 +138,11 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return sqrt(n / (n - 1)) t / z for n = `count`, with the 97.5 % quantiles t (Student, n - 1) and z (normal)."""
+    """Return sqrt(n / (n - 1)) t / z for n = `count` realisations.
+
+    Here t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, and z that of the normal
+    distribution.
+    """
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
@@ -146,9 +153,9 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    `residuals` is a stack of the differences between data and law. If the law holds, the first
-    row is about as large as the differences between the resamples and the first row. The result is NaN if there are too
-    few resamples, for example with one realisation.
+    `residuals` is a stack of the differences between data and law. If the law holds, the residuals of the data (the
+    first row) are about as large as the differences between the residuals of a resample and those of the data. The
+    result is NaN if there are too few resamples, for example with one realisation.
     """
     caused = _caused(residuals, count)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
@@ -163,7 +170,8 @@ def scatter(residuals: FloatArray, count: int) -> float:
 def _caused(residuals: FloatArray, count: int) -> FloatArray:
     """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples.
 
-    The residuals that errors cause are added as the root of the sum of squares, because groups affect different cases.
+    The rms residuals that the errors of the groups cause are combined as the root of the sum of squares, because each
+    group affects other cases.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))

@@ -1,8 +1,8 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Every new value lies halfway between two older values. So cases that differ in other parameters use the same values of
-the axis. An interval is tested by a prediction from older values only, and halved if the error of the prediction
-exceeds the tolerance.
+Every new value lies halfway between two older values. Cases that differ in other parameters therefore use the same
+values of the axis. To test an interval, the output is predicted from older values only; the interval is halved if the
+error of the prediction exceeds the tolerance.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Number of groups of realisations for the jackknife, which estimates the scatter of a mean: the mean is computed again
-#: and again, each time without one of the groups. With 20 groups, the scatter is known to about 15 %.
+#: Number of groups of realisations for the jackknife. To estimate the scatter of a mean, the mean is computed without
+#: the first group, then without the second group, and so on. With 20 groups, the scatter is known to about 15 %.
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
@@ -34,13 +34,13 @@ FEWEST = 3
 #: such a prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values. A position is
-#: the distance from the newer end as a fraction of the length of the interval.
+#: the distance from the end that was added later, as a fraction of the length of the interval.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True)
 class Mean:
-    """Means of an output over realisations, with the data from which their errors are estimated."""
+    """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
     # Shape (1 + groups, cases...): row 0 contains the means over all realisations. Each further row contains the means
     # without one group of realisations. A case without a successful realisation is NaN.
@@ -100,7 +100,7 @@ class Mesh:
 
     @property
     def cases(self) -> BoolArray:
-        """Mask of the cases that are needed, with the shape of the series."""
+        """Mask of the needed cases; its dimensions are the axes of the series."""
         dims = len(self.series.sizes)
         others = [k for k in range(dims) if k not in self.used]
         each = (
@@ -149,8 +149,9 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 class _Interval:
     """An interval of an adaptive axis whose interpolation error exceeds the tolerance or was not tested.
 
-    `case` is the index of the combination of non-adaptive values. `share` is the middle of the interval and `width` its
-    length, both as fractions of the axis. `excess` is the interpolation error divided by the tolerance, at least 1.
+    `case` is the index of the combination of non-adaptive values. `share` is the position of the middle of the
+    interval, and `width` the length of the interval, both as fractions of the axis. `excess` is the interpolation error
+    divided by the tolerance, at least 1.
     """
 
     case: tuple[int, ...]
@@ -163,8 +164,8 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
     All needed cases of the mesh must have results. `means` contains the means of each output that has a tolerance. Also
-    return a number for each adaptive axis: the combinations of non-adaptive values with an interval that misses a
-    tolerance or was not tested, but that cannot be halved.
+    return a number for each adaptive axis. It counts the combinations of non-adaptive values that still have intervals
+    to halve, but of which none can be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -191,7 +192,7 @@ def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_
 
 
 def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
-    """Return a mesh with a value in the middle of some intervals."""
+    """Return the mesh with a new value in the middle of each of the given intervals."""
     axis, shares, used = mesh.series.axes[number], mesh.shares[number], mesh.used[number]
     new = sorted({interval.share for interval in intervals} - set(shares.tolist()))
     shares = np.array([*shares, *new])
@@ -224,14 +225,14 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
         ends = refinement.spread.at(shares)
         for k, middle in enumerate(middles.tolist()):
             if refinement.spread.whole and refinement.spread.at(np.array([middle]))[0] in (ends[k], ends[k + 1]):
-                continue  # there is no whole number between the ends
+                continue  # an axis of whole numbers: none lies between the ends
             is_untested = max(levels[k], levels[k + 1]) < TESTED and not np.isneginf(excess[k])
             if is_untested or excess[k] > 1.0:
                 yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))
 
 
 def _lines(mean: Mean, number: int) -> Mean:
-    """Return the same means with one row for each line of cases along an axis."""
+    """Return the same means as a table: each row is a line of cases along the axis with index `number`."""
     groups = np.moveaxis(mean.groups, number + 1, -1)
     error = np.moveaxis(mean.error, number, -1)
     rows = math.prod(error.shape[:-1])
@@ -239,9 +240,9 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return the largest ratio of interpolation error and tolerance of all lines, for each interval.
+    """Return, for each interval, the largest interpolation error of any line, divided by the tolerance of this line.
 
-    Failed cases are left out of their line. The ratio is minus infinity if every line has a failed case at an end of
+    Failed cases are left out of their line. The result is minus infinity if every line has a failed case at an end of
     the interval.
     """
     worst = np.full(places.size - 1, -np.inf)
@@ -264,8 +265,8 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
 
     A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
     output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. The error
-    is the largest difference to the monotone cubic through all values, minus an allowance for the scatter of the
-    realisations and the discretisation errors. It may be negative.
+    is the largest difference between these predictions and the monotone cubic through all values, minus an allowance
+    for the scatter of the realisations and the discretisation errors. It may be negative.
 
     `places` are the ascending positions along the axis, and `levels` their levels: 0 for the ends of the axis, 1 for
     its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in `Mean.groups`, and

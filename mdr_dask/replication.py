@@ -12,22 +12,24 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: Least and largest factor by which a round multiplies the number of realisations: there should be few rounds, and few
-#: results estimate their scatter poorly.
+#: Least and largest factor by which a round multiplies the number of realisations. The least factor avoids many rounds.
+#: The largest factor is limited because a few results give only a poor estimate of the scatter.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: The same factor for a fitted constant, whose required number of realisations cannot be estimated.
+#: Factor by which a round multiplies the number of realisations if a fitted constant needs more of them. The required
+#: number cannot be estimated for a fitted constant.
 GROWTH = 1.5
-#: Least number of results from which the estimated standard error alone decides. If cases stopped earlier, only 89 % of
-#: the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
+#: Least number of results with which the estimated standard error alone decides whether a case stops. If cases stopped
+#: earlier, only 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
 FEWEST = 12
 #: A case also stops if its standard error is below this fraction of the tolerance: its results are practically equal.
 NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round; `count` is their number so far.
+    """Return the number of realisations after the next round; `count` is the number so far.
 
-    `growth` is the factor by which the number of realisations of each case must grow, at most 1 if the case has enough.
+    `growth` contains, for each case, the factor by which the number of realisations must grow. The factor is at most 1
+    if the case has enough realisations.
     """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
@@ -42,13 +44,13 @@ def growth_needed(
     until: Mapping[str, Tolerance],
     scatter: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
-    """Return the factor by which the number of results of each case must grow: at most 1 if the case has enough.
+    """Return, for each case, the factor by which the number of results must grow: at most 1 if the case has enough.
 
     `values` and `scatter` (the standard error estimated within each realisation) have the shape (..., realisations).
     `until` limits the standard error of the mean of each output. A case has enough results if the standard error is
-    within the tolerance and, in addition, there are `FEWEST` results, or the standard error that follows from `scatter`
-    is within the tolerance, or the standard error is below the fraction `NEGLIGIBLE` of the tolerance. The factor is 0
-    for a case without a successful result.
+    within the tolerance and one of three conditions is met: there are `FEWEST` results; the standard error that follows
+    from `scatter` is within the tolerance; or the standard error is below the fraction `NEGLIGIBLE` of the tolerance.
+    The factor is 0 for a case without a successful result.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -66,13 +68,16 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return, for outputs with a tolerance, the output that estimates their scatter from one realisation, if any."""
+    """Return the outputs that estimate the scatter of other outputs from one realisation.
+
+    The keys are the outputs with a tolerance; an output without such an estimate is left out.
+    """
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor by which the number of results must grow to reach the allowed error."""
+    """Return the factor by which the number of results must grow so that the error falls to the allowed error."""
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2

@@ -7,7 +7,7 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules with a tuple ``FITS``, and the models to whose stores these fits apply (empty: all).
+#: Modules with a tuple ``FITS``, and the models to whose stores these fits apply; an empty tuple means all models.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),
@@ -19,7 +19,7 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "scaling": ("sliding_friction",),
 }
 
-#: Entry point group in which other packages offer tuples of `Fit`.
+#: Name of the group of entry points through which other packages offer tuples of `Fit`.
 GROUP = "mdr_dask.fits"
 
 

@@ -18,14 +18,14 @@ STEP = 1e-3
 #: Largest number of groups into which the values along a dimension are divided. One group is shifted at a time.
 GROUPS = 32
 #: A group of cases needs no more realisations if a shift of its results by one standard error changes the constant by
-#: less than this fraction of the half width of its interval.
+#: less than this fraction of the half width of the interval of the constant.
 NEGLIGIBLE = 0.01
 #: To extrapolate to zero scatter, the fit is repeated with the scatter changed by this fraction.
 LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
-    """Raise CampaignError if no fit gives a constant that a campaign names in ``until``."""
+    """Raise CampaignError if a campaign names a constant in ``until`` that no fit gives."""
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
     problems = []
@@ -71,8 +71,8 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
     """Return, for each series, the half width that the interval of a constant would have without scatter.
 
     This part is due to grid errors and to the misfit of the law. The fit is repeated with slightly less and slightly
-    more scatter, and each result is extrapolated linearly to zero scatter. The smaller one is used, because the half
-    width jumps if a change of the scatter alters the verdict on the law.
+    more scatter, and each of the two half widths is extrapolated linearly to zero scatter. The smaller of the two
+    extrapolated values is used, because a half width jumps if the change of the scatter alters the verdict on the law.
     """
     now = half_widths(fit, constant, groups)
 
@@ -96,7 +96,7 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return, for each series, where the interval of a constant is too wide and more realisations are worth while.
+    """Return, for each series, whether the interval of a constant is too wide and more realisations are worth while.
 
     More realisations are not worth while if the part of the half width that is due to scatter is within the tolerance,
     and the total half width would exceed the tolerance even with `at_most` realisations.
@@ -117,11 +117,12 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of the series `name` that affect a constant, where `wide` says that its interval is too wide.
+    """Return the cases of the series `name` on which the constants with too wide an interval depend.
 
-    Along each dimension over which the constant is fitted, neighbouring cases form groups. The results of one group at
-    a time are shifted, and the fit is repeated. A case is chosen if the constant depends on its group along each of
-    these dimensions.
+    `wide` marks these constants: there is one constant for each combination of values along the dimensions of `wide`.
+    Each constant is fitted to all cases along the other dimensions of the series. Along each of these other dimensions,
+    neighbouring cases form groups. The results of one group at a time are shifted, and the fit is repeated. A case is
+    chosen if the constant depends on the group of the case along each of these dimensions.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -156,7 +157,7 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return flags along the dimensions `dims` only, set if any flag along the other dimensions is set."""
+    """Return flags along the dimensions `dims`; a flag is set if any flag along the other dimensions is set."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 

@@ -1,7 +1,8 @@
 """The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
 
-Every result has a sentence ``law_holds`` about the law with the constants that its source states; it begins with *yes*,
-*approximately*, *no* or *not tested*. If constants are fitted, ``fitted_law_holds`` is about the law with these.
+Every result has a sentence ``law_holds``. It says whether the law holds with the constants that the publication of the
+law states, and begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, a second sentence
+``fitted_law_holds`` says whether the law holds with the fitted constants.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: A law holds if the rms relative departure is at most this value, and the largest departure at most twice this value.
+#: A law holds if the rms relative departure is at most this value, and the largest relative departure at most twice it.
 WITHIN = 0.05
-#: The same, for a law that holds approximately.
+#: A law holds approximately if the rms relative departure is at most this value, and the largest at most twice it.
 APPROXIMATE = 0.15
 #: Departures count against a law if scatter and errors alone would cause such departures with a probability below this.
 DOUBTFUL = 0.05
@@ -27,13 +28,14 @@ DOUBTFUL = 0.05
 
 @dataclass(frozen=True)
 class Fit:
-    """A law that can be fitted to the stores of some models (empty: all), by ``mdr-dask fit STORE NAME``.
+    """A law that ``mdr-dask fit STORE NAME`` fits to the stores of some `models`; an empty tuple means all models.
 
     `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
     realisation, ...), and all scalar parameters as coordinates. `compute` returns constants with the ends of their 95 %
     intervals (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``, with units in
-    the attrs. If `apart`, each series is fitted separately, and the mapping has one series. `constants` names the
-    constants with an interval, which a campaign may name in ``until``; it may depend on the campaign.
+    the attrs. If `apart`, each series is fitted separately: `compute` takes one series at a time. `constants` names the
+    constants with an interval, which a campaign may name in ``until``. If these names depend on the campaign,
+    `constants` is a function of the campaign.
     """
 
     name: str
@@ -66,7 +68,7 @@ class Fit:
 
 
 def require(data: xr.Dataset, *names: str) -> None:
-    """Raise FitError if a study lacks one of these parameters of a Kelvin body on a generated line."""
+    """Raise FitError if a study lacks one of these parameters, which a Kelvin body on a generated line has."""
     missing = [name for name in names if name not in data.variables]
     if missing:
         raise FitError(
@@ -140,7 +142,8 @@ def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine, from the derivatives of the law, shape (cases, p).
 
     A constant is changed by 1, and the other constants are fitted again. If the law then changes by less than `WITHIN`
-    in every case, which does not count against a law, very different values of the constant fit equally well.
+    in every case, very different values of the constant fit equally well, because a departure below `WITHIN` does not
+    count against a law.
     """
     largest = np.empty(effects.shape[1])
     for k in range(largest.size):
@@ -161,8 +164,8 @@ def verdict(
 ) -> str:
     """Return a sentence on whether a law holds, from a stack of the relative departures of the data from the law.
 
-    `constants` is the number of constants fitted to these data. `where` describes a case in words. `excluded` says that
-    the interval of a fitted constant excludes the stated value, so that scatter does not explain the departures.
+    `constants` is the number of constants fitted to these data. `where` describes a case in words. If `excluded`, the
+    interval of a fitted constant excludes the stated value; scatter then does not explain the departures.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
@@ -188,10 +191,10 @@ def law_holds(
 ) -> str:
     """Return a sentence on whether a law holds, from the relative departures of the data.
 
-    `chance` is the probability that scatter and errors alone cause such departures: NaN if unknown, None if they
-    cannot. `scatter` is the rms departure that scatter and errors alone would exceed with a probability of 5 %. If
-    scatter may hide departures above `WITHIN`, the verdict is at best *approximately*; above `APPROXIMATE`, it is *not
-    tested*.
+    `chance` is the probability that scatter and errors alone cause such departures. It is NaN if the probability is
+    unknown, and None if scatter and errors cannot cause the departures. `scatter` is the rms departure that scatter and
+    errors alone would exceed with a probability of 5 %. If scatter may hide departures above `WITHIN`, the verdict is
+    at best *approximately*. If scatter may hide departures above `APPROXIMATE`, the verdict is at best *not tested*.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

@@ -37,9 +37,9 @@ _ROUNDING = 1e-9
 class Calibration:
     """The result of a calibration.
 
-    `noises` are the possible errors of measurement, and `units` the units of unknowns, conditions and output.
-    `contradicted` contains the residuals if the errors of measurement in the table do not explain them. The posterior
-    then uses errors that are large enough, so that the intervals include the misfit.
+    `noises` are the possible errors of measurement, and `units` the units of unknowns, conditions and output. If the
+    errors of measurement in the table do not explain the residuals, `contradicted` contains these residuals. The
+    posterior then uses larger errors, so that the intervals include the misfit.
     """
 
     measured: Measured
@@ -71,7 +71,7 @@ class Calibration:
 
     @cached_property
     def products(self) -> list[identifiability.Product]:
-        """Products of powers of undetermined unknowns that the data determine."""
+        """Products of powers of undetermined unknowns; the data determine these products, but not their factors."""
         return identifiability.products(self.posterior, self.values, self.free)
 
     def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
@@ -103,7 +103,7 @@ class Calibration:
 
     @cached_property
     def noise(self) -> tuple[FloatArray, bool]:
-        """Standard deviations of the measured points, and whether they are proportional to the values."""
+        """Standard errors of the measured points, and whether these errors are proportional to the predicted values."""
         shares = self.posterior.weights @ self.posterior.noise
         cuts = np.cumsum([noise.sizes.size for noise in self.noises])[:-1]
         parts = np.split(shares, cuts)
@@ -126,7 +126,8 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
 
     The prior of an unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically. The
     covariance of the points, which are normally distributed, has three parts: errors of measurement; scatter of the
-    rough lines, common to all points; and errors of grid and interpolation, one half of which is common to all points.
+    rough lines, common to all points; and errors of grid and interpolation, of which one half is common to all points
+    and the other half is independent for each point.
 
     Without errors of measurement in the table, their size is unknown, and its logarithm has a uniform prior. The errors
     are then either equal for all points, or proportional to the values.
@@ -284,7 +285,10 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of unknown `k`, if it is the only undetermined one and has exactly one open end."""
+    """Return the one-sided interval of unknown `k`.
+
+    The result is empty unless `k` is the only undetermined unknown and exactly one end of its axis is open.
+    """
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}
@@ -324,7 +328,10 @@ def sentence(found: Calibration) -> str:
 
 
 def _cut(found: Calibration) -> str:
-    """Return a text on the intervals of determined unknowns that an axis cuts off (see `identifiability.CUT`)."""
+    """Return a text that names the determined unknowns whose interval is cut off by an end of the axis.
+
+    For the criterion see `identifiability.CUT`.
+    """
     is_high = identifiability.at_ends(found.posterior) > -identifiability.CUT
     cut = [
         f"{name} at {shown(float(axis[end]), found.units[name])}"

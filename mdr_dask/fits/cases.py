@@ -29,8 +29,8 @@ def each(
 ) -> xr.Dataset:
     """Fit a law to the cases along some dimensions, for each combination of values along the other dimensions.
 
-    The function `inner` returns the dimensions along which one fit combines the cases. The first of `outputs`, which
-    the fit needs, must have no dimensions but axes of the study and realisations.
+    The function `inner` returns the dimensions along which one fit combines the cases. The fit needs all of `outputs`.
+    The first of them must have no dimensions except the axes of the study and ``realisation``.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -67,9 +67,9 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 class Table(NamedTuple):
-    """The values of an output in all cases and their errors, shape (cases, realisations), divided by a scale.
+    """Values of an output and the errors of the values, shape (cases, realisations), both divided by a scale.
 
-    `columns` are other numbers of the cases, such as load and velocity.
+    `columns` contains further numbers of each case, such as the load and the velocity.
     """
 
     values: FloatArray

@@ -26,8 +26,9 @@ def laws_of(
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
     """Fit the laws that suit the groups, and return with each law a sentence on whether it holds.
 
-    These are a power law of the shift factors for velocities, and Arrhenius' law and the WLF law of log10 a_T for
-    temperatures. They are fitted relative to the middle group, so that the fit does not depend on the reference.
+    If the groups are velocities, the law is a power law of the shift factors. If the groups are temperatures, the laws
+    are Arrhenius' law and the WLF law of log10 a_T. All laws are fitted relative to the middle group, so that the fit
+    does not depend on the reference.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
@@ -55,15 +56,18 @@ def laws_of(
 
 
 def sign_of(over: str) -> int:
-    """Return -1 if the abscissa is a time, otherwise 1: a shift factor is log10 a_T times this sign."""
+    """Return the sign by which log10 a_T is multiplied to give a shift factor.
+
+    The sign is -1 if the abscissa is a time, otherwise 1.
+    """
     return -1 if over == "t" or over.lower().startswith("time") else 1
 
 
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
     """Return temperatures in K.
 
-    Without a unit, temperatures count as K if the median of `groups` (or of these temperatures) exceeds 250, else as
-    degC.
+    Temperatures without a unit count as K if the median of `groups` exceeds 250, otherwise as degC. Without `groups`,
+    the median of the temperatures themselves is used.
     """
     if unit in ("", "1", "-"):
         unit = "K" if np.median(temperatures if groups is None else groups) > 250 else "degC"
@@ -87,7 +91,7 @@ def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     """Add ``law_holds`` to a master curve: whether the curves collapse, and which law the shift factors follow.
 
-    If the curves do not determine all shift factors, nothing is tested: for example, two plateaus of the same height
+    If the curves do not determine all shift factors, nothing is tested. For example, two plateaus of the same height
     coincide for any shift.
     """
     open_steps = curve.attrs.get("undetermined", "")
@@ -106,10 +110,10 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
 
 
 def _collapse(curve: xr.Dataset) -> str:
-    """Return a sentence on whether the curves collapse; for two ordinates, about the one that collapses less well.
+    """Return a sentence on whether the curves collapse.
 
-    The scatter of all points about the merged curve is compared with the scatter of each curve about its own
-    polynomial.
+    If there are two ordinates, the sentence is about the ordinate that collapses less well. The scatter of all points
+    about the merged curve is compared with the scatter of each curve about its own polynomial.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
@@ -141,9 +145,10 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 def _scatter(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> tuple[float, float, int]:
-    """Return the squared residuals of each curve from its own polynomial, summed over the curves.
+    """Return Schwarz's criterion, the sum of squared residuals, and the degrees of freedom.
 
-    Schwarz's criterion, which selects the degree, stands before the sum, and the degrees of freedom behind it.
+    The residuals are the distances of the points of each curve from a polynomial fitted to this curve. The criterion is
+    used to select the degree of the polynomials.
     """
     squares, freedom = 0.0, 0
     for places in members:

@@ -77,7 +77,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
 
 def _agree(one: pd.Series, other: pd.Series) -> bool:
-    """Return whether two columns differ by a constant factor or a constant difference only, as for different units."""
+    """Return whether two columns differ only by a constant factor or difference, as if they had different units."""
     first, second = one.to_numpy(dtype=np.float64), other.to_numpy(dtype=np.float64)
     with np.errstate(all="ignore"):
         return any(np.ptp(each) <= AGREE * abs(np.median(each)) for each in (second / first, second - first))
@@ -144,7 +144,7 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return the kind of vertical factors that suit these columns, recognised by name or unit.
+    """Return the kind of vertical factors for these columns, which are recognised by name or unit.
 
     ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group; otherwise ``none``.
     """
@@ -161,7 +161,7 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return a second parameter in which the curves differ, velocity or temperature, or None."""
+    """Return the column of a second parameter (velocity or temperature) in which the curves differ, or None."""
     found = None
     for name in ("normal_force", "velocity", "temperature"):
         column = column_of(frame, name)
@@ -175,7 +175,7 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the group of each curve, and log10 of its abscissae and of its ordinates, shape (channels, points)."""
+    """Return the group of each curve, and log10 of the abscissae and of the ordinates, shape (channels, points)."""
     rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
     if rows.size == 0 or np.any(rows <= 0):
         names = " and ".join(repr(name) for name in (over, *ordinates))
@@ -209,11 +209,11 @@ def pairs_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Return the index of the group of each value: measured values scatter about a few set values.
+    """Divide measured values, which scatter about a few set values, into groups; return the group of each value.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. One exception: values that alternate within one sweep of the abscissa are
-    rounded readings of one set value.
+    each distinct value is a group of its own. There is one exception: neighbouring values that alternate within one
+    sweep of the abscissa are rounded readings of one set value, and form one group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

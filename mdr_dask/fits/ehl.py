@@ -53,9 +53,9 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
-    An exponent is NaN if its group does not vary, or varies only in proportion to powers of the other two. Computed
-    films have no scatter; therefore the intervals follow from the misfit. ``law_holds`` is about the formula of Pan and
-    Hamrock.
+    W, U and G are called groups. An exponent is NaN if its group does not vary, or if its group is proportional to a
+    product of powers of the other two groups. Computed films have no scatter; therefore the intervals follow from the
+    misfit. ``law_holds`` is about the formula of Pan and Hamrock.
     """
     found: Variables = {}
     departures, of_stated = [], []

@@ -93,10 +93,10 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the index of the lowest velocity at which friction is proportional to the velocity, or None.
+    """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
 
-    The index may exceed 0, because with the time stepping of the original papers, friction at low velocities does not
-    fall below a spurious limit.
+    The index is not always 0: with the time stepping of the original papers, friction at very low velocities is too
+    large, because it does not fall below a spurious limit.
     """
     if velocity.size == 1:
         return 0
@@ -176,7 +176,7 @@ def _plateau(data: xr.Dataset) -> Variables:
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
     """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
 
-    `height` is the stack of the largest mu divided by the rms slope. `flat` are the indices of the cases on the
+    `height` is the stack of the largest mu divided by the rms slope. `flat` contains the indices of the cases on the
     plateau.
     """
     meaning = "largest mu divided by the rms slope in contact"
@@ -198,7 +198,10 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return the velocities, dimensionless or, without rms height, v tau in m; and a text format that describes one."""
+    """Return the velocities, and a format for the text that describes a velocity.
+
+    The velocities are dimensionless; if the study has no rms height, they are v tau in m.
+    """
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
@@ -207,7 +210,7 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    `x` are the logarithms of the velocities, and `ends` is the interval of the slope `found.rise`.
+    `x` contains the logarithms of the velocities, and `ends` the ends of the interval of the slope `found.rise`.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
@@ -226,7 +229,7 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which of the `known` cases are in regions I to III, that is up to the largest friction at each load."""
+    """Return which `known` cases are in regions I to III: up to the velocity of the largest friction at each load."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

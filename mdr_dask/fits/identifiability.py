@@ -1,4 +1,4 @@
-"""Find which unknowns of a calibration the data determine, and which products of powers of the others."""
+"""Find which unknowns of a calibration the data determine, and which products of powers of the other unknowns."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: An end of the axis of an unknown is *open* if the logarithm of the posterior density there is less than `OPEN` below
-#: its maximum: for a normal density, within two standard errors.
+#: An end of the axis of an unknown is *open* if ln(posterior density) at this end is less than `OPEN` below its
+#: maximum. For a normal density, an open end lies within two standard errors of the maximum.
 OPEN = 2.0
-#: The axis cuts off the 95 % interval of an unknown if the density at its end exceeds 5 % of the maximum.
+#: The axis cuts off the 95 % interval of an unknown if the density at an end of the axis exceeds 5 % of the maximum.
 CUT = float(np.log(20))
 #: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
@@ -38,7 +38,7 @@ def at_ends(found: Posterior) -> FloatArray:
 
 
 def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
-    """Return the indices of unknowns that have an open end or depend strongly on such unknowns (see `LINKED`)."""
+    """Return the indices of the unknowns that have an open end, or that depend on such unknowns (see `LINKED`)."""
     free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:
         return []

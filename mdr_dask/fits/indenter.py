@@ -60,7 +60,7 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
     The indenter must be flat compared with the roughness, and be pressed in by at least the rms height. The velocity
-    must not exceed that of the largest friction.
+    must not exceed the velocity at which friction is largest.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)

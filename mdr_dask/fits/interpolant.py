@@ -25,9 +25,10 @@ LARGEST, PIECES = 2_000_000, 16
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
 
-    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis, each on the scale `Scale.of`
-    its values. An axis of words, or with fewer than `FEWEST` numbers, is kept as it is. The error is the half width of
-    the 95 % interval of the mean plus the error of interpolation, which is estimated by leaving out every second value.
+    The mean over realisations is interpolated by monotone cubics (PCHIP) along one axis after the other. Each axis is
+    linear or logarithmic, as `Scale.of` chooses for its values. An axis of words, or an axis with fewer than `FEWEST`
+    numbers, receives no new values. The error is the half width of the 95 % interval of the mean plus the error of
+    interpolation, which is estimated by leaving out every second value.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -60,7 +61,10 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output, and the half width of its interval, or else its discretisation error."""
+    """Return the mean of an output, and the half width of the interval of the mean.
+
+    Where the interval is unknown, the discretisation error replaces the half width.
+    """
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
@@ -80,10 +84,13 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that an adaptive axis left out; their half widths include the error of interpolation."""
+    """Interpolate the cases that an adaptive axis left out.
+
+    The half widths of the interpolated cases include the error of interpolation.
+    """
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
-    for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes
+    for axis in axes * 2:  # twice, because a value filled along one axis is used along the others
         places = mean[mean.dims[axis]].to_numpy()
         lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
         for case in np.ndindex(lines.shape[:-1]):
@@ -97,7 +104,7 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
     """Return the values along an axis, in which missing values are interpolated, and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    # the factor LEFT is not applied, because a gap at a missing value is as wide as a gap at a value that was left out
+    # the factor LEFT is divided out: a gap at a missing value is as wide as a gap at a value that the test leaves out
     left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])

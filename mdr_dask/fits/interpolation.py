@@ -8,10 +8,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Smallest number of values along an axis; half of them must determine a curve.
+#: Smallest number of values along an axis; every second of these values must still determine a curve.
 FEWEST = 4
-#: Error of interpolation with all values, divided by that with every second value: 1/4 for an error of second order.
-#: At a kink, the ratio would be 1/2.
+#: Ratio of two errors of interpolation: with all values, and with every second value only. The ratio is 1/4 for an
+#: error of second order; at a kink it would be 1/2.
 LEFT = 0.25
 
 
@@ -46,9 +46,9 @@ class Scale:
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Divide each interval between neighbouring places into equal pieces, and return all old and new places.
+    """Divide each interval between neighbouring places on an axis into equal pieces; return all old and new places.
 
-    The pieces are equal on the scale `Scale.of` the old places.
+    The pieces are equal on the scale that `Scale.of` chooses for the old places.
     """
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
@@ -60,7 +60,7 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis by monotone cubics; the default scale is `Scale.of` the places."""
+    """Interpolate values along an axis by monotone cubics; by default, the axis has the scale ``Scale.of(places)``."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -71,7 +71,7 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values linearly along an axis; the default scale is `Scale.of` the places."""
+    """Interpolate values linearly along an axis; by default, the axis has the scale ``Scale.of(places)``."""
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -81,8 +81,8 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Estimate the error of interpolation at every place of an axis by leaving out every second value.
 
-    `table` contains positions of numbers on `scale`; the error is that of the numbers. The largest of the estimates at
-    a place and at its two neighbours is returned.
+    `table` contains numbers converted to `scale`; the result is the error of the numbers before this conversion. The
+    error at a place is the largest of the estimates at this place and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)

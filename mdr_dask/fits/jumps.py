@@ -37,7 +37,7 @@ from mdr_dask.fits.cases import (
 
 MODELS = ("velocity_jump",)
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
-LEAST = 2  # smallest number of successful realisations of a case
+LEAST = 2  # a case needs at least this number of successful realisations
 
 LAW = 0.4  # the constant c of eq. 4.11, as stated in the thesis
 # a case with mu_1 / s below this value is in region I; there, eqs. 4.9 and 4.11 differ by less than 3 %
@@ -78,7 +78,7 @@ def each_jump(
 class Jumps(NamedTuple):
     """Stacks of mu_1, d_mu_0 and mu_2, shape (rows, cases), and dv / v_1 (`change`) of some cases.
 
-    The rms slope is NaN for smooth lines. `counts` are the numbers of successful realisations.
+    The rms slope is NaN for smooth lines. `counts` contains the number of successful realisations of each case.
     """
 
     before: FloatArray
@@ -174,8 +174,8 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # `fitted` may repeat the fit for shifted data, which have another number of rows; then mu_1 of the first row is
-        # used
+        # `fitted` may repeat the fit for shifted data, which have another number of rows; mu_1 of the first row is then
+        # used for all of them
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -230,7 +230,7 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
         count,
     )
     line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    # changes of the mean if the data are shifted by their departures
+    # changes of the means of zeta and xi if the data are shifted by their departures from these means
     moved = scale * (flat.constants[len(both) :] - flat.constants[0])
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
     with np.errstate(divide="ignore", invalid="ignore"):  # zeta of a resample may be zero

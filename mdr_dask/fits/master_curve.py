@@ -138,7 +138,7 @@ def _of_two_groups(
 def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the nearest group if the reference lies just outside the groups.
 
-    Measured set points scatter; therefore a tenth of the mean distance between groups is allowed.
+    Because measured set points scatter, the reference may lie outside by a tenth of the mean distance between groups.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
@@ -252,9 +252,10 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return mean friction as a function of force and velocity, of the first series with roughness that varies both.
+    """Return the mean friction of the first series with roughness, as a function of force and velocity.
 
-    If another series has the same forces and velocities but no roughness, its friction is subtracted.
+    Only a series that varies both force and velocity is used. If another series has the same forces and velocities but
+    no roughness, the friction of this other series is subtracted.
     """
     wanted = {"normal_force", "velocity"}
     means = [

@@ -20,10 +20,11 @@ FEWEST = 6
 class Residuals(NamedTuple):
     """Residuals of the best prediction.
 
-    `scaled` are measured minus predicted values, divided by the standard deviation of this difference. `relative` and
-    `errors` are the rms of these differences and of their standard deviations, divided by the rms measured value.
-    `chi_squared` includes correlations; NaN if the errors of measurement are unknown. `freedom` is the number of points
-    minus the number of unknowns, or products of unknowns, that the data determine.
+    `scaled` are measured minus predicted values, divided by the standard deviation of this difference. `relative` is
+    the rms of these differences, and `errors` the rms of their standard deviations; both are divided by the rms
+    measured value. `chi_squared` takes the correlations of the errors into account; it is NaN if the errors of
+    measurement are unknown. `freedom` is the number of points minus the number of constants that the data determine;
+    these constants are unknowns or products of unknowns.
     """
 
     scaled: FloatArray
@@ -68,8 +69,9 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
     """Return the probability that a trend of the residuals is due to chance, and the condition with the trend.
 
-    A parabola is fitted to the residuals against the rank of each condition. The smallest probability is multiplied by
-    the number of conditions, because every condition is another chance to find a trend.
+    For each condition, a parabola is fitted to the residuals as a function of the rank of the value of the condition.
+    The smallest probability is multiplied by the number of conditions, because every condition is another chance to
+    find a trend.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

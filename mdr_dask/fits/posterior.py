@@ -21,7 +21,8 @@ START = {1: 64, 2: 24, 3: 12, 4: 8}
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
 #: Cells are left out if ln(density) is below its maximum by more than this; their total probability is below 1e-5.
 REACH = 14.0
-#: Refinement ends when ln(density) varies by less than this value within a divided cell, on average over all cells.
+#: Refinement ends when the variation of ln(density) within a divided cell is less than this value. The variation is
+#: averaged over all cells, weighted with the density.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
@@ -32,7 +33,7 @@ _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: a pattern of standard deviations, and the possible factors (`sizes`) of this pattern.
+    """Errors of measurement: a pattern of standard deviations, and factors (`sizes`) by which it may be multiplied.
 
     Without a pattern, the standard deviation of a point is the factor times the absolute value of its prediction.
     """
@@ -50,8 +51,8 @@ class Noise(NamedTuple):
 def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) -> Callable[[FloatArray], FloatArray]:
     """Return a function that takes places in the unit cube and returns logarithms of the likelihood of measured values.
 
-    The shapes are (sets, unknowns) and (sets, sizes of all noises). All items of `noises`, and all sizes within one
-    item, have the same prior probability.
+    The places have the shape (sets, unknowns), the logarithms the shape (sets, number of sizes of all noises). All
+    items of `noises`, and all sizes within one item, have the same prior probability.
     """
 
     def of(places: FloatArray) -> FloatArray:

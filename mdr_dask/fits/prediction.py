@@ -27,17 +27,18 @@ MOST = 4
 LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
-#: All cases use the same rough lines, so that few modes represent their scatter. `MODES`: largest number of modes.
-#: `SHARE`: share of the variance that the modes must represent.
+#: All cases use the same rough lines, so that a few modes represent the scatter of all cases. `MODES`: largest number
+#: of modes. `SHARE`: share of the variance that the modes must represent.
 MODES, SHARE = 6, 0.999
 
 
 class Predicted(NamedTuple):
     """Predicted values of the output at the measured points, for several sets of unknowns.
 
-    `mean` is the mean over the realisations, shape (sets, points). `together`, shape (sets, points, modes), contains
-    one standard deviation of errors that are common to all points: modes of the scatter of the rough lines, and one
-    mode for grid and interpolation. `alone` is the variance of the errors that are independent for each point.
+    `mean` is the mean over the realisations, shape (sets, points). `together`, shape (sets, points, modes), contains,
+    for each mode, one standard deviation of an error that is common to all points. Several modes represent the scatter
+    of the rough lines, and the last one the errors of grid and interpolation. `alone` is the variance of the errors
+    that are independent for each point.
     """
 
     mean: FloatArray
@@ -110,7 +111,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
 
 
 def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
-    """Remove axes that have a single value from a study; raise DataError if a measured point lies outside the study."""
+    """Remove the axes with a single value from a study; raise DataError if a measured point lies outside the study."""
     array = dataset[measured.output]
     single = [str(dim) for dim in array.dims if dim in array.coords and array.sizes[dim] == 1 and dim != "realisation"]
     dataset = dataset.squeeze(single)
@@ -158,7 +159,7 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return the numbers of every case that are interpolated, and whether logarithms replace the means.
+    """Return, for every case, the numbers to interpolate; also return whether the means are replaced by logarithms.
 
     Along the last axis are: the mean; 1 if the mean is missing; the scatter that is independent of other cases; the
     error of grid and interpolation; and the modes of the scatter that is common to all cases.
@@ -193,7 +194,7 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return the missing cases and their neighbours; a cubic depends on two cases on each side of a point."""
+    """Mark the missing cases and their neighbours, because a cubic depends on two cases on each side of a point."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -214,7 +215,7 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the part of the standard error that is independent for each case, and the modes of the common scatter.
 
-    A factor from Student's t distribution accounts for few realisations.
+    A factor from Student's t distribution enlarges both if there are few realisations.
     """
     count = deviations.shape[-1]
     if count < 2:
@@ -254,7 +255,10 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return a prediction that is interpolated linearly: means in a dense table, errors between the computed values."""
+    """Return a prediction that interpolates linearly.
+
+    Means are interpolated in a dense table, errors between the computed values of the unknowns.
+    """
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

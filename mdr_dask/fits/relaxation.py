@@ -4,7 +4,8 @@ For the symbols v_1, v_2, dv, mu_1, mu_2, d_mu_0 and s see `mdr_dask.fits.jumps`
 body, t' = (t - t_0) / tau, and q_max the largest wave number of the roughness.
 
 By eqs. 4.13 to 4.15, mu - mu_2 begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by eq. 4.11, and is proportional to exp(-b
-t'). By eq. 4.12, the rate b is (v_1 tau q_max)^p with p = 1 below v_1 tau q_max = 1, and p = 1 - H above it.
+t'). By eq. 4.12, the rate b is (v_1 tau q_max)^p with p = 1 below v_1 tau q_max = 1, and p = 1 - H above it; H is the
+Hurst exponent.
 """
 
 from __future__ import annotations
@@ -55,10 +56,10 @@ FIELDS = {
 class Relaxation(NamedTuple):
     """One exponential fitted to a trace, which is the mean of mu - mu_2 over realisations as a function of time.
 
-    `rate` and `integral_rate` are stacks of the fitted rate, and of the rate that follows from the integral of the
-    trace. If scatter and errors do not explain the departures, further rows of `rate` widen its interval: the integral
-    rate, and rates fitted to the trace after a shift by the departures. `holds` is the verdict; departures are divided
-    by the largest value of the trace.
+    `rate` is the stack of the fitted rate, and `integral_rate` the stack of the rate that follows from the integral of
+    the trace. If scatter and errors do not explain the departures of the trace from the exponential, further rows of
+    `rate` widen the interval: the integral rate, and rates fitted to the trace after a shift by the departures. `holds`
+    is the verdict; departures are divided by the largest value of the trace.
     """
 
     rate: FloatArray
@@ -74,7 +75,7 @@ def widths(time: FloatArray) -> FloatArray:
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace; its times do not resolve slower or faster rates."""
+    """Return the rates that are tried for a trace; the times of the trace do not resolve slower or faster rates."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
@@ -98,9 +99,10 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
 
 
 def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float) -> Relaxation:
-    """Fit one exponential to the relaxation of friction up to t' = `WINDOW` / `expected`, the rate by eq. 4.12.
+    """Fit one exponential to the relaxation of friction up to t' = `WINDOW` / `expected`.
 
-    `traces` is a stack of mu - mu_2 at the times t', which begin with 0; `error` is the standard error of the mean.
+    `expected` is the rate by eq. 4.12. `traces` is a stack of mu - mu_2 at the times t'; the first time is 0. `error`
+    is the standard error of the mean of mu - mu_2.
     """
     inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # the fit uses at least nine points in time
     t, y = time[inside], traces[:, inside]
@@ -140,9 +142,9 @@ def _passing_number(case: xr.Dataset) -> float:
 
 
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times t', which begin with 0, values, shape (realisations, values), and grid errors of the mean values.
+    """Return the times t', the values, shape (realisations, values), and the grid errors of the mean values.
 
-    The values are mu_1, d_mu_0, mu_2, and mu at all times except the first.
+    The first time is 0. The values are mu_1, d_mu_0, mu_2, and mu at all times except the first.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -153,7 +155,8 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
     """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The error of mu includes the error of mu_2. Therefore the error of mu - mu_2 is the difference of both.
+    The error of mu includes the error of mu_2. Therefore the error of mu - mu_2 is the error of mu minus the error of
+    mu_2.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
@@ -245,7 +248,10 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return an array whose columns are the stacks of the rates of all cases, extended by their first values."""
+    """Return an array whose columns are the stacks of the rates of all cases.
+
+    A shorter stack is filled up with its first value.
+    """
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
     columns = np.empty((max(1 + bootstrap.RESAMPLES, *(stack.size for stack in stacks)), len(stacks)))

@@ -71,7 +71,10 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return slope in contact over slope of the line, and mu over mu of eq. 3.12, if the store has the outputs."""
+    """Return two ratios: slope in contact over slope of the line, and mu over mu by eq. 3.12.
+
+    The result is empty if the store lacks one of the required outputs.
+    """
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -97,7 +100,8 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
     `fraction` is the length in contact divided by that of the line. Only waves that are shorter than the length in
-    contact count, and without such waves the result is NaN. The shortest wave is two of the `points` of the line long.
+    contact count, and without such waves the result is NaN. The shortest wave is twice as long as the distance between
+    neighbouring `points` of the line.
     """
     power = 2 * (1 - hurst)
     # wave numbers 2 pi / L_cont and q_max, both divided by 2 pi / L
@@ -182,8 +186,8 @@ def collapse(
     """Shift curves of ln(friction) against ln(velocity) onto a common natural cubic spline by least squares.
 
     The problem is solved for the first row of the stack; the shifts of the other rows follow by linearisation. `curve`
-    is the index of the curve of each point. Of two searches, from the shifts `start` and from 0, the better result is
-    used. Without `vertical`, curves are shifted along ln(velocity) only.
+    contains, for each point, the index of its curve. One search begins with the shifts `start`, another with no shifts;
+    the better result is used. Without `vertical`, curves are shifted along ln(velocity) only.
     """
     from scipy.optimize import OptimizeResult, least_squares
 
@@ -224,7 +228,7 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the matrix, shape (places, knots), from heights at the knots to values of a natural cubic spline.
+    """Return the matrix, shape (places, knots), that converts heights at the knots to values of a natural cubic spline.
 
     Outside the range of the knots, the spline continues as a straight line.
     """
@@ -237,7 +241,10 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction against velocity, up to the largest friction, of all loads onto one common curve."""
+    """Shift the curves of friction against velocity onto one common curve.
+
+    There is one curve for each load. It ends at its largest friction.
+    """
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))

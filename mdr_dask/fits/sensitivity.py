@@ -34,8 +34,9 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     neighbours).
 
     The intervals follow from a jackknife over groups of points and over realisations. They tend to be too wide, because
-    points of a Sobol sequence fill space more evenly than random points. Failed cases are left out, in Saltelli's
-    design with their base point.
+    points of a Sobol sequence fill space more evenly than random points. In Saltelli's design, an index is computed
+    from the base points for which all required cases succeeded; in other designs, it is computed from all cases that
+    succeeded.
     """
     inputs = _inputs(dataset)
     values, left_out = _values(dataset, output)
@@ -101,7 +102,8 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 def _is_saltelli(columns: FloatArray) -> bool:
     """Return whether the cases are those of Saltelli's design.
 
-    Each group of cases then has a point a, a point b, and for each input the point a with this input of point b.
+    Each group of cases then consists of a point a, a point b and, for each input, a copy of point a in which this input
+    has the value from point b.
     """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
@@ -141,9 +143,10 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
 
-    The index is the mean of two estimates, and its interval contains both. Products of neighbours only are right for
-    random points. With the product of each point with itself, the estimate is right for points that fill space evenly,
-    such as a Sobol sequence, whose neighbours differ systematically in their other inputs.
+    The index is the mean of two estimates, and its interval contains both. The first estimate uses products of
+    different points only; it is right for random points. The second estimate also uses the product of each point with
+    itself. It is right for points that fill space evenly, such as a Sobol sequence, because neighbours then differ
+    systematically in their other inputs.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -174,7 +177,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half widths of the intervals, from the indices without one part of the data each."""
+    """Return the half widths of the intervals; each of `parts` contains the indices without one part of the data."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error

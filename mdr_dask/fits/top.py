@@ -10,8 +10,8 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most the first of these fractions for which a
-#: parabola fits.
+#: A parabola is fitted to the points that are below the maximum by at most one of these fractions: the first fraction
+#: for which the parabola fits.
 TOPS = (0.3, 0.2, 0.1, 0.05)
 FLAT = 0.05  # points that are below the maximum by at most this fraction belong to the plateau
 
@@ -28,7 +28,8 @@ class Top(NamedTuple):
     """Stacks that describe the maximum of a parabola through the points near the largest friction.
 
     `height` is the maximum, corrected for its bias; its interval includes the residuals of the parabola. `place` is
-    ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) there, 0 unless it is at an end of the range.
+    ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum; it is 0 unless the maximum is
+    at an end of the fitted range.
     """
 
     height: FloatArray
@@ -39,8 +40,7 @@ class Top(NamedTuple):
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     """Fit a parabola to a stack of friction against x = ln(velocity), ascending, near the largest friction.
 
-    Points far from the maximum are left out until scatter and errors explain the residuals, or until the last of `TOPS`
-    is reached.
+    Points far from the maximum are left out, as given by `TOPS`, until scatter and errors explain the residuals.
     """
     for drop in TOPS:
         near = _about_the_top(stack[0], drop)
@@ -52,14 +52,18 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    # a parabola through three points has no residuals; the error is the maximum of the parabola minus the highest point
+    # a parabola through three points has no residuals; its error is then its maximum minus the value of the highest
+    # point
     else:
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points, at least three, near the maximum that are below it by at most the fraction `drop`."""
+    """Return the range of points around the maximum that are below it by at most the fraction `drop`.
+
+    The range contains at least three points.
+    """
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])

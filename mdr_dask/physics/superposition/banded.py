@@ -27,7 +27,10 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 class Factors(NamedTuple):
-    """Cholesky factors L_c, W_c and that of the corner, for each row of parameters; L_c and the corner by diagonals."""
+    """Cholesky factors for each row of parameters: L_c, W_c and the factor of the corner.
+
+    L_c and the factor of the corner are stored by diagonals.
+    """
 
     band: FloatArray
     border: FloatArray

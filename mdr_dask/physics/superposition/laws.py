@@ -134,11 +134,11 @@ def _fit(
     covariance: FloatArray,
     ends: tuple[list[float], list[float]] | None = None,
 ) -> tuple[ShiftLaw, FloatArray, FloatArray, float]:
-    """Fit by generalised least squares; return a law without constants, and the constants.
+    """Fit a law by generalised least squares.
 
-    The constants are their values, their covariance, and the half width of their interval in standard errors.
-    If departures from the law exceed the errors of the factors, an additional scatter is fitted, whose square is added
-    to the variances of the factors.
+    Return the law, in which `constants` is still empty; the values of the constants and their covariance; and the half
+    width of the interval of a constant in standard errors. If departures from the law exceed the errors of the factors,
+    an additional scatter is fitted, whose square is added to the variances of the factors.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size

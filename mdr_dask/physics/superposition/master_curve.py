@@ -178,7 +178,7 @@ def superpose(
 
 
 def known_rise(kelvin: FloatArray, vertical: Vertical) -> FloatArray:
-    """Return log10 of b_T for a modulus, of 1 / b_T for a compliance, and otherwise 0.
+    """Return log10(b_T) for a modulus, log10(1 / b_T) for a compliance, and otherwise 0.
 
     The reference temperature T0 of b_T is the first temperature.
     """
@@ -265,7 +265,7 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return for each row of shifts and each curve whether there is a gap in the abscissa before this curve."""
+    """Return, for each row of shifts, which curves are separated from all earlier curves by a gap in the abscissa."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)

@@ -57,7 +57,7 @@ FARTHEST = 8.0
 
 @dataclass(frozen=True)
 class Curves:
-    """Points of all curves; abscissae are in widths of a curve, ordinates in decades.
+    """Points of all curves; abscissae are divided by the median width of a curve, ordinates are in decades.
 
     The origin of `x` is such that the smallest ``x + shift`` is near zero. `member` is the index of the curve of each
     point, and `height` the median height of a curve in each channel. `splines` is the number of spline coefficients of

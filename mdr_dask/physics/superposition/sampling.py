@@ -40,8 +40,8 @@ SCAN = 81
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
-    For each pair of neighbouring curves separately, many steps between their shifts are tried. Mean and variance of the
-    step, weighted with the density of the pair, are then combined with the prior of the shifts.
+    For each pair of neighbouring curves, many values of the step between their two shifts are tried. Mean and variance
+    of the step, weighted with the density of the pair, are then combined with the prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, SCAN)
     means, variances = [], []
@@ -58,7 +58,7 @@ def first_guess(curves: Curves) -> FloatArray:
             rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
             rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
             channels = curves.y.shape[0]
-            # the best step may lie between two tried steps; the noise includes the resulting error of the ordinate
+            # the best step may lie between two tried steps; the noise is at least the resulting error of the ordinate
             coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
             noise = slice(1 + 2 * channels, 1 + 3 * channels)
             rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
@@ -74,7 +74,7 @@ def first_guess(curves: Curves) -> FloatArray:
 
 
 def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
-    """Return the same curves with enough spline coefficients for the shifted curves and a margin on both sides."""
+    """Return the curves with as many spline coefficients as the shifted curves need, with a margin on both sides."""
     moved = curves.x + np.append(0.0, shifts)[curves.member]
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
 

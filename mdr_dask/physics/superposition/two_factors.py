@@ -16,11 +16,12 @@ from mdr_dask.physics.superposition.master_curve import Superposition, superpose
 
 @dataclass(frozen=True)
 class TwoShifts:
-    """Factors ``h(v, T) = a(v) + b(T)``, a in `first` and b in `second`, and the merged curve, the same in both.
+    """Factors ``h(v, T) = a(v) + b(T)`` and the merged curve.
 
-    `chi_squared` is the reduced chi-squared of the differences between the factor of each curve and the sum a + b; if
-    it is above one, the errors of the factors are multiplied by its square root. `probability` is that of a chi-squared
-    at least as large if every factor is really a sum; 1 if no degree of freedom is left.
+    `first` contains a, `second` contains b, and both contain the same merged curve. `chi_squared` is the reduced
+    chi-squared of the differences between the factor of each curve and the sum a + b; if it is above one, the errors of
+    the factors are multiplied by its square root. `probability` is the probability of a chi-squared at least as large
+    if every factor is really a sum; it is 1 if no degree of freedom is left.
     """
 
     first: Superposition
@@ -38,8 +39,9 @@ def superpose_twice(
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
     First all curves are superposed with independent factors. Then a and b are fitted to these factors, weighted by
-    their covariance; to first order, the result is as if a and b were fitted to the curves directly.
-    The factors are zero at the middle value of each quantity; of the first, at the value nearest to `reference`.
+    their covariance; to first order, the result is as if a and b were fitted to the curves directly. The factors are
+    zero at the middle value of each quantity. If a `reference` is given, the factors of the first quantity are zero at
+    the value nearest to it instead.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)

@@ -16,9 +16,10 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
-# largest rise of a cubic cell above its ends, over the sum of upward slope at the start and downward slope at the end
+# a cubic cell rises above its higher end by at most this factor times the sum of two slopes: the upward slope at its
+# start and the downward slope at its end
 STEEPEST_RISE = 4 / 27
-UNRESOLVED = 0.5  # a line is unresolved if its mean squared slopes at nodes and over cells differ by this fraction
+UNRESOLVED = 0.5  # relative difference of the mean squared slopes at nodes and over cells of an unresolved line
 
 
 class CubicLine(NamedTuple):
@@ -44,7 +45,7 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     height : array, shape (n,)
         Heights at equidistant nodes of one period.
     slope : array, shape (n,), or None
-        Slope of the line at the nodes, if the unit of length is the length of the line.
+        Slopes at the nodes, for a line of length 1.
     """
     height = np.append(height, height[0])
     if slope is None:
@@ -85,10 +86,10 @@ def without_kinks(line: CubicLine) -> CubicLine:
 class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
-    A periodic line starts in the cell of its highest point. Heights are relative to this point, because only small
-    distances from it matter under light loads, and these must have no rounding error. `peak` is the largest height in
-    each cell; `mean` and `stretch` are the integrals of the height and of the squared slope over each cell. `start` is
-    the position of the highest point in cell 0, where a period begins, and `top` is its height.
+    A periodic line starts in the cell of its highest point. Heights are relative to this point: under light loads, only
+    points slightly below it matter, and their small depths must not be lost to rounding. `peak` is the largest height
+    in each cell; `mean` and `stretch` are the integrals of the height and of the squared slope over each cell. `start`
+    is the position of the highest point in cell 0, where a period begins, and `top` is its height.
     """
 
     height: FloatArray
@@ -113,7 +114,7 @@ def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @jit
 def summit(a: float, b: float, c: float) -> float:
-    """Return the position between 0 and 1 at which a cubic has a maximum, or `NONE`."""
+    """Return the position of the maximum of a t + b t^2 + c t^3 between t = 0 and t = 1; `NONE` if there is none."""
     discriminant = b * b - 3 * a * c
     if not discriminant > 0:
         return NONE
@@ -128,7 +129,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
-    between = 3 * rise - first - last  # no extreme if this slope and the slopes at both ends have the same sign
+    between = 3 * rise - first - last  # no extreme inside if this and the slopes at both ends have the same sign
     if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)
@@ -157,7 +158,7 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
     """Return the cell of the highest point of a periodic cubic line, and the position in the cell (0 to 1).
 
-    For the slopes, the length of the line is 1.
+    The slopes are those of a line of length 1.
     """
     line = periodic_line(height, slope)
     return _highest(line.height, line.enter, line.leave)[:2]
@@ -231,7 +232,7 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
     The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The
-    difference is distributed over the other cells, so that the total remains exact.
+    resulting change of the first cell is distributed over the other cells, so that the sum remains exact.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

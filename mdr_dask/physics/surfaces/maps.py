@@ -17,11 +17,11 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum
 Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # smallest number of points along each axis
-MOST_MISSING = 0.05  # largest fraction of missing points that are filled
+MOST_MISSING = 0.05  # largest accepted fraction of missing points; missing points are filled
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
-BAND = 128  # number of rows processed together, so that they fit into the processor's cache
-SIGNIFICANT = 1e-3  # rings below this fraction of the largest contribution may be due to rounded heights
-MOST_SCATTER = 0.02  # an octave is used if scatter alone gives its angular harmonics at most this mean square
+BAND = 128  # number of rows that are processed at once; these rows fit into the processor's cache
+SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
+MOST_SCATTER = 0.02  # an octave is used if scatter alone causes angular harmonics with at most this mean square
 FLAT = 1e-12  # a map is flat if its range of heights is at most this fraction of its largest height
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent if Hann's window is used
@@ -64,7 +64,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 def _off_neighbours(height: FloatArray) -> FloatArray:
     """Return the distance of each inner point from the mean of its two neighbours, along x or along y.
 
-    The smaller of both distances is used, because a point on a crest is far from its neighbours across the crest.
+    The smaller of the two distances is used, because a point on a crest is far from its neighbours across the crest.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -85,7 +85,7 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
     count = int(np.count_nonzero(missing))
     if count > MOST_MISSING * missing.size:
         share, most = distinguishable(100 * count / missing.size, 100 * MOST_MISSING)
-        raise DataError(f"expected at most {most} % of missing points, which are filled, got {share} %")
+        raise DataError(f"expected at most {most} % of missing points (missing points are filled), got {share} %")
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
@@ -156,16 +156,18 @@ def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
 
 @dataclass(frozen=True)
 class MapSpectrum:
-    """The spectrum of a map, in rings of the wave vector of width dq; dq is 2 pi divided by the shorter side.
+    """The spectrum of a map, summed in rings in the plane of the wave vectors.
 
-    `density` is C2D, m^4: the power in a ring divided by the area of the ring, which preserves rms height and rms
-    gradient. `count` is the number of waves in each ring; a wave vector and its negative count as two waves.
-    `independent` is the fraction of the waves that are statistically independent, less than 1 with a window.
-    `rms_height`, m, is that of the windowed map. `slopes` are the mean squares of the slopes along x and along y, and
-    their mean product. `angular` is the mean of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power; 0
-    for an isotropic surface. `cuts` are wave numbers and C_cut, m^3, of straight profiles along x and along y. `axes`
-    compares, for each axis, the power of the wave along this axis with the mean power in the ring: the median ratio
-    over the rings, divided by ln(2), which is 1 for an isotropic surface.
+    The width dq of a ring is 2 pi divided by the shorter side of the map. `density` is C2D, m^4: the power in a ring
+    divided by the area of the ring, so that rms height and rms gradient are preserved. `count` is the number of waves
+    in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves that are
+    statistically independent; it is less than 1 with a window. `rms_height`, m, is that of the windowed map. `slopes`
+    contains the mean square of the slope along x, the mean square of the slope along y, and the mean product of both
+    slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power; they
+    are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of straight profiles: first along
+    x, then along y. `axes` contains one number for each axis. In each ring, the power of the wave along the axis is
+    divided by the mean power of the waves. The number is the median of these ratios, divided by ln(2); it is 1 for an
+    isotropic surface.
     """
 
     wavenumber: FloatArray
@@ -213,7 +215,7 @@ class MapSpectrum:
         """
         there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # numbers without gaps: octaves without a ring are skipped
+        _, octave = np.unique(octave, return_inverse=True)  # number only the octaves that contain rings
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -304,7 +306,7 @@ def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return the wave numbers and C_cut of straight profiles; C_cut is two-sided, `power` is the sum over q and -q."""
+    """Return the wave numbers and the two-sided C_cut of straight profiles; `power` is the sum over q and -q."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 

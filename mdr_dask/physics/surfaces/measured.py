@@ -44,9 +44,9 @@ def measured_line(
 ) -> MeasuredLine:
     """Turn positions and heights of a recorded line, m, into one period of a line with uniform spacing.
 
-    The length of the period is the number of points times the mean spacing. `taper` is the fraction of the line over
-    which a cosine window reduces the heights towards their mean, one half at each end. Waves shorter than `shortest` or
-    longer than `longest` are removed; 0 means no limit.
+    The length of the period is the number of points times the mean spacing. At both ends, a cosine window reduces the
+    heights towards their mean; `taper` is the fraction of the line in this window, one half of it at each end. Waves
+    shorter than `shortest` or longer than `longest` are removed; 0 means no limit.
     """
     x, z = _ordered(position, height)
     steps = np.diff(x)
@@ -107,5 +107,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the rms slope of a periodic line, from all waves down to a wavelength of two spacings of the points."""
+    """Return the rms slope of a periodic line, from all waves that are at least two spacings of the points long."""
     return waves_of(height).rms_slope() / length

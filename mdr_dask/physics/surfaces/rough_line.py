@@ -27,7 +27,7 @@ class RoughLine:
 
     @cached_property
     def nodes(self) -> tuple[FloatArray, FloatArray]:
-        """Heights and slopes of the roughness on a grid with twice as many nodes as Nyquist points."""
+        """Heights and slopes of the roughness on a grid that has two nodes for each Nyquist point."""
         return self.roughness.heights(2 * self.points), self.roughness.slopes(2 * self.points)
 
     def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:

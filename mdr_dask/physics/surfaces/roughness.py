@@ -81,7 +81,7 @@ def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # eight entries: `modes` is a power of two, and may vary by a factor of 128
+@lru_cache(maxsize=8)  # eight entries, enough for the powers of two within a factor of 128
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False

@@ -20,7 +20,7 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # number of bins per decade of the wave number
 BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
-NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this; for roughness it is at most -1
+NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this; it is -1 or less for roughness
 NOISE_TAIL = 0.5  # the last part of the cut, of this many decades, is tested for noise
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
@@ -28,7 +28,7 @@ STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 class Cut(NamedTuple):
     """The spectrum of straight profiles in logarithmic bins of the wave number q, rad/m.
 
-    `density` is C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq. `error` is its relative standard error.
+    `density` is C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq. `error` is the relative standard error of C_cut.
     """
 
     wavenumber: FloatArray
@@ -55,8 +55,8 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     window = hann_window(points) if hann else np.ones(points)
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
-    last = (points - 1) // 2  # leaves out the wave of two spacings, whose phase is unknown
-    independent = len(lines) / (1.94 if hann else 1.0)  # 1.94: Hann's window correlates the power of adjacent waves
+    last = (points - 1) // 2  # without the wave that is two spacings long, whose phase is unknown
+    independent = len(lines) / (1.94 if hann else 1.0)  # because of the window, adjacent waves are correlated
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
 
@@ -81,7 +81,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the slice of the bins before the first fall steeper than `STEEPEST`; the spectrum ends at this fall."""
+    """Return the bins up to the first place at which the spectrum falls more steeply than `STEEPEST`; it ends there."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -98,7 +98,8 @@ def of_cut(cut: Cut) -> Spectrum:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    # Waves beyond the last wave number of the cut contribute to the cut. C2D is assumed to end one step beyond it.
+    # Waves beyond the last wave number of the cut contribute to the cut. C2D is assumed to end one bin beyond this wave
+    # number.
     edge = q[-1] ** 2 / q[-2]
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)

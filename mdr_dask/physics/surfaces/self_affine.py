@@ -39,8 +39,8 @@ class SelfAffine(NamedTuple):
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
     """Return the wave number beyond which the spectrum is noise, or infinity if the spectrum has no flat tail.
 
-    The tail comprises the last `decades` decades of the wave number. It is noise if its slope d log C / d log q is
-    above `flattest`: -1 for C2D, -0.5 for a straight profile.
+    The tail comprises the last `decades` decades of the wave number. The tail is noise if its slope d log C / d log q
+    is above `flattest`, which is -1 for C2D and -0.5 for a straight profile.
     """
     wavenumber, density = bins.wavenumber, bins.density
     tail = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)

@@ -23,7 +23,7 @@ class Shape(Protocol):
     """An indenter: the line that the solvers use, and the body of revolution."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height at every x, and the slopes on its left and right side.
+        """Return the height at every x, and the slopes to the left and to the right of x.
 
         Heights are positive towards the elastomer, and 0 at the tip.
         """
@@ -52,7 +52,7 @@ class PowerLaw:
         return cls(mapped(exponent) * coefficient, exponent)
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height -c |x|^n at every x, and the slopes on its left and right side."""
+        """Return the height -c |x|^n at every x, and the slopes to the left and to the right of x."""
         distance = np.abs(x)
         steepness = self.coefficient * self.exponent * distance ** (self.exponent - 1)
         left = np.where(x > 0, -steepness, steepness)
@@ -76,7 +76,7 @@ class PowerLaw:
 
 @dataclass(frozen=True)
 class RoundedCone:
-    """The line of a cone with the slope s (`steepness`), whose tip is rounded up to the radius b (`blend`).
+    """The line of a cone with the slope s (`steepness`); the tip is rounded within the radius b (`blend`).
 
     The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. The line is g = s x^2 / b up to x = b, and
     g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and Willert, Handbook of Contact
@@ -87,7 +87,7 @@ class RoundedCone:
     blend: float
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height at every x, and the slopes on its left and right side, which are equal."""
+        """Return the height at every x, and the slopes to the left and to the right of x, which are equal."""
         place, b = np.abs(x), self.blend
         outer = np.maximum(place, b)
         root = np.sqrt((outer - b) * (outer + b))

@@ -1,4 +1,4 @@
-"""The spectrum C2D(q) of an isotropic surface: spectra of its MDR line and of a straight profile, and its moments.
+"""The spectrum C2D(q) of an isotropic surface, the spectra of its MDR line and of a straight profile, and rms values.
 
 Angular wave numbers q are in rad/m. Spectra are two-sided: both signs of the wave vector carry the same power (thesis
 2.12 and 2.13).
@@ -80,7 +80,8 @@ class Spectrum:
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
         """Return the spectrum, continued by power laws up to the wavelength `longest` and down to `shortest`, m.
 
-        A wavelength of 0 means no change. The exponent is fitted to the points within `decades` decades of the end.
+        A wavelength of 0 means no change. The exponent is fitted to the points within `decades` decades of the end that
+        is continued.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -115,7 +116,7 @@ class Spectrum:
         """Return the integral of q^order C2D over q, which is exact for the power laws between points."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
-        # the integral of exp(v), where v is linear, is the width times the logarithmic mean of the end values
+        # if v is linear, the integral of exp(v) is the width times the logarithmic mean of exp(v) at both ends
         small = np.abs(rise) < 1e-8
         safe = np.where(small, 1.0, rise)
         mean = np.where(small, 0.5 * (value[1:] + value[:-1]), np.diff(value) / safe)

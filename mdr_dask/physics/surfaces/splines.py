@@ -1,7 +1,7 @@
 """A closed line as a cubic spline with one coefficient for each of its equidistant nodes.
 
-Between two nodes, with t from 0 to 1, the line is ``a0 + a1 t + a2 t^2 + a3 t^3``. It lies there between the smallest
-and the largest of four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
+Between two nodes, with t from 0 to 1, the line is ``a0 + a1 t + a2 t^2 + a3 t^3``. Between these nodes, the line lies
+between the smallest and the largest of four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _phases(modes: int, nodes: int) -> FloatArray:
 
 
 def _at_nodes(phase: FloatArray) -> FloatArray:
-    """Return the Fourier transform of the B-spline's nodal values 1/6, 4/6, 1/6."""
+    """Return the Fourier transform of 1/6, 4/6, 1/6, the values of the B-spline at the nodes."""
     return np.asarray((2 + np.cos(phase)) / 3)
 
 
@@ -92,7 +92,7 @@ def integral(of: Piece, t: float) -> float:
 
 @jit
 def shares(t: float) -> Piece:
-    """Return the weights of the four coefficients of a piece in the integral of the piece from 0 to t."""
+    """Return four weights: the integral of a piece from 0 to t is the weighted sum of its four coefficients."""
     square = t * t
     second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
@@ -105,7 +105,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     There are at most three. There is none if all four coefficients are positive, or if none of the four is positive.
     """
     of = piece(spline, k)
-    # the same formula as in `piece`, so that adjacent pieces agree
+    # the formula with which `piece` computes the start of the next piece, so that adjacent pieces agree
     end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6
     t_before, before = 0.0, of[0]
     first, second = _extremes(of)
