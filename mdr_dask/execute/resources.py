@@ -11,10 +11,10 @@ from typing import Any
 class Resources:
     """The threads, processes or cluster that a run uses: by default, all cores of this machine.
 
-    `workers` is a number of processes, used instead of threads. `scheduler` is the address of a running Dask scheduler,
-    `cluster` a description from `mdr_dask.campaign.cluster.load_cluster`, and `client` a Dask client, which stays open.
-    `patience` and `case_timeout` are seconds: without any worker, after which a run on a cluster ends with an error;
-    and for one case, after which it fails.
+    Models in plain Python use processes instead of threads, unless `threads` is given. `scheduler` is the address of a
+    running Dask scheduler, `cluster` a description from `mdr_dask.campaign.cluster.load_cluster`, and `client` a Dask
+    client, which stays open. `patience`: seconds without any worker after which a run on a cluster ends with an error.
+    `case_timeout`: seconds after which a case fails; blocks are then computed in child processes.
     """
 
     threads: int | None = None
