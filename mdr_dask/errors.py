@@ -49,12 +49,11 @@ class FitError(MdrDaskError):
 _ALL_DIGITS = 17
 
 
-def _rounded(number: float, digits: int) -> str:
-    return f"{number:.{digits}g}"
-
-
 def distinguishable(
-    value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
+    value: float,
+    *limits: float,
+    digits: int = 3,
+    write: Callable[[float, int], str] = lambda number, digits: f"{number:.{digits}g}",
 ) -> tuple[str, ...]:
     """Return a number and its limits as texts, with more digits than `digits` if different numbers would look equal."""
     for more in range(digits, _ALL_DIGITS):

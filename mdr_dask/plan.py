@@ -245,7 +245,9 @@ def templates(
     for series in campaign.series:
         sizes = {**series.sizes, "realisation": realisations}
         if math.prod(sizes.values()) > MOST_CASES:
-            problems.append(_too_many(campaign, series, sizes))
+            counts = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
+            where = f"series.{series.name}" if series.name else "parameters"
+            problems.append(f"{campaign.source}: {where}: expected at most {MOST_CASES:.0e} results, got {counts}")
             continue
         outputs = _outputs(campaign, series, model)
         extra = model.coordinates(series.parameters)
@@ -270,12 +272,6 @@ def _outputs(campaign: Campaign, series: Series, model: Model[Any]) -> tuple[Out
     units = units | {companion.name: units[name] for name, companion in model.companions.items() if name in units}
     wanted = [model.output(name) for name in campaign.outputs]
     return tuple(replace(output, unit=units.get(output.name, output.unit)) for output in wanted)
-
-
-def _too_many(campaign: Campaign, series: Series, sizes: Mapping[str, int]) -> str:
-    counts = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
-    where = f"series.{series.name}" if series.name else "parameters"
-    return f"{campaign.source}: {where}: expected at most {MOST_CASES:.0e} results, got {counts}"
 
 
 def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
@@ -309,10 +305,15 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     it still has few operations, it gets more realisations, then more values of the other axes, and finally the
     realisations of later rounds.
     """
-    whole = _whole_dims(template, model)
+    shared = (
+        axis.dim for path in model.whole for axis in template.series.axes if f"{axis.path}.".startswith(f"{path}.")
+    )
+    whole = list(dict.fromkeys(shared))
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
-    limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
-    goal = _goal(template, chunks)
+    numbers = max((math.prod(template.extra_shape(output)) for output in template.outputs), default=1)
+    limit = max(1, CHUNK_BYTES // (8 * numbers))
+    parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
+    goal = min(OPERATIONS, max(LEAST, parts * template.mean_operations(chunks) / FEW_BLOCKS))
     for dim in reversed(whole):
         while chunks[dim] > 1 and (math.prod(chunks.values()) > limit or _is_cut(template, chunks, dim, 4 * goal)):
             chunks[dim] = math.ceil(chunks[dim] / 2)
@@ -331,12 +332,6 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     }
 
 
-def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
-    """Return the dimensions along which cases share work, in the order of `Model.whole`."""
-    dims = [axis.dim for path in model.whole for axis in template.series.axes if _is_whole(axis, path)]
-    return list(dict.fromkeys(dims))
-
-
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
     """Return whether blocks with more than `most` operations are halved along `dim`, along which cases share work.
 
@@ -351,16 +346,6 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
     return growth < REPEATED_WORK
 
 
-def _goal(template: Template, chunks: Mapping[str, int]) -> float:
-    """Return the number of operations that a block should need."""
-    parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
-    return min(OPERATIONS, max(LEAST, parts * template.mean_operations(chunks) / FEW_BLOCKS))
-
-
-def _is_whole(axis: Axis, path: str) -> bool:
-    return axis.path == path or axis.path.startswith(path + ".")
-
-
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the nearly equal parts, of at most `most`, into which a dimension is cut.
 
@@ -371,10 +356,6 @@ def _part(template: Template, dim: str, most: int) -> int:
     if dim == "realisation" and replication.goes_on:
         return max(part for part in range(1, most + 1) if math.gcd(part, replication.at_least) == part)
     return math.ceil(size / math.ceil(size / most))
-
-
-def _bytes_per_result(template: Template) -> int:
-    return 8 * max((math.prod(template.extra_shape(output)) for output in template.outputs), default=1)
 
 
 def estimate(campaign: Campaign) -> Estimate:

@@ -109,9 +109,10 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Return the arrays of a group, which are cached as long as the layout stays the same."""
-    found = layout_mark(url)
+    found, here = layout_mark(url), platform.node()
     if found != layout:
-        raise StoreError(f"{url}: {_other_store(found)}")
+        what = f"{here} finds another store at this path, or a later shape of it" if found else f"not seen from {here}"
+        raise StoreError(f"{url}: {what}; the workers need a shared file system or a URL")
     return _opened(url, series, bytes_of(url))
 
 
@@ -119,22 +120,13 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
     """Return empty arrays in memory like the stored ones, and the dictionary in which their encoded chunks appear."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
-    memory = zarr.storage.MemoryStore(encoded)
-    empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}
-    return {name: array.with_config({"write_empty_chunks": True}) for name, array in empty.items()}, encoded
-
-
-def _whole_chunks(array: Any) -> dict[str, Any]:
-    """Return the metadata of an array that is made larger, so that all its chunks are whole."""
-    shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
-    return {**array.metadata.to_dict(), "shape": shape}
-
-
-def _other_store(found: str | None) -> str:
-    here, remedy = platform.node(), "the workers need a shared file system or a URL"
-    if found is None:
-        return f"not seen from {here}; {remedy}"
-    return f"{here} finds another store at this path, or a later shape of it; {remedy}"
+    memory, empty = zarr.storage.MemoryStore(encoded), {}
+    for name, array in shown.items():
+        # a larger array, so that all its chunks are whole
+        shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
+        larger = array_of({**array.metadata.to_dict(), "shape": shape}, memory, array.path)
+        empty[name] = larger.with_config({"write_empty_chunks": True})
+    return empty, encoded
 
 
 def layout_mark(url: str) -> str | None:

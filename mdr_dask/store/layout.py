@@ -7,7 +7,6 @@ import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -44,6 +43,8 @@ _COORDINATE_CHUNK = 4096
 #: Names of the attributes that `_series_attributes` returns. If series are added to a store without series, these
 #: attributes stay at the root.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
+#: Packages whose versions are written to the store.
+PACKAGES = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
@@ -255,12 +256,6 @@ def _attrs(unit: str | None, long_name: str) -> dict[str, Any]:
     return {"units": unit, "long_name": long_name} if unit else {"long_name": long_name}
 
 
-@cache
-def _packages() -> dict[str, str]:
-    """Return the versions of packages that are written to the store."""
-    return {name: version(name) for name in ("numpy", "scipy", "numba", "dask", "zarr", "xarray")}
-
-
 def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     what = "grown" if "history" in earlier else "laid out"
@@ -280,7 +275,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
         "source": Path(campaign.source).name,
         "host": platform.node(),
         "python": platform.python_version(),
-        "versions": {"mdr_dask": __version__, **_packages()},
+        "versions": {"mdr_dask": __version__, **{name: version(name) for name in PACKAGES}},
         "created": earlier.get("created", now),
         "history": history,
     }
