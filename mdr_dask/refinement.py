@@ -225,7 +225,7 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
         ends = refinement.spread.at(shares)
         for k, middle in enumerate(middles.tolist()):
             if refinement.spread.whole and refinement.spread.at(np.array([middle]))[0] in (ends[k], ends[k + 1]):
-                continue  # an axis of whole numbers: none lies between the ends
+                continue  # the axis has whole numbers only, and none lies between the ends
             is_untested = max(levels[k], levels[k + 1]) < TESTED and not np.isneginf(excess[k])
             if is_untested or excess[k] > 1.0:
                 yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))

@@ -23,7 +23,8 @@ NARROW = 0.25
 #: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
 #: at most this factor.
 ROUNDED = 1.15
-#: Probability of each interval, by the ending of its name: ``x_low``, ``x_high`` and ``x_low_68``, ``x_high_68``.
+#: Probability of each interval. The keys are the suffixes of the ends: ``x_low``, ``x_high``; ``x_low_68``,
+#: ``x_high_68``.
 LEVELS = {"": 0.95, "_68": 0.6827}
 #: Suffixes of the names of the median and of the ends of the intervals, and the cumulative probability at each.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
@@ -31,7 +32,7 @@ SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in
 
 
 def at_ends(found: Posterior) -> FloatArray:
-    """Return ln(density) minus its maximum at both ends of the axis of each unknown, shape (unknowns, 2)."""
+    """Return ln(density / largest density) at both ends of the axis of each unknown, shape (unknowns, 2)."""
     borders = np.stack([found.places < found.width, found.places > 1 - found.width], axis=-1)
     density = np.where(borders, found.density[:, None, None], -np.inf)
     return np.asarray(density.max(axis=0) - found.density.max())

@@ -21,7 +21,7 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 BINS = 10  # number of bins per decade of the wave number
 BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
 NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this; it is -1 or less for roughness
-NOISE_TAIL = 0.5  # the last part of the cut, of this many decades, is tested for noise
+NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
 
