@@ -146,7 +146,8 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
         )
         centres, density = across[first], np.bincount(cell, weights)
     else:
-        density, edges = np.histogram(across, np.histogram_bin_edges(across, "rice"), weights=weights)
+        ends = identifiability.quantiles(across, weights, [1e-4, 1 - 1e-4])
+        density, edges = np.histogram(across, np.histogram_bin_edges(across, "sturges", tuple(ends)), weights=weights)
         centres = (edges[1:] + edges[:-1]) / 2
     height, back = density / density.max(), np.exp if log else np.asarray
     colour = "#909090" if is_free else colours.colour(1)

@@ -151,7 +151,7 @@ def printed_unit(unit: str) -> str:
     """Return a unit as figures show it: with raised powers, with µm for ``um``, and with °C for ``degC``."""
     unit = re.sub(r"\bu(?=(m|s|N|Pa|W|rad)\b)", "µ", unit)
     unit = re.sub(r"\bpercent\b", "%", re.sub(r"\bdeg(?=C?\b)", "°", unit))
-    return re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
+    return re.sub(r"\^(-?[\d./]+)", r"$^{\1}$", unit)
 
 
 def named(name: str, value: xr.DataArray) -> str:

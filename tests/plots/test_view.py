@@ -16,7 +16,7 @@ from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import curves, page
-from mdr_dask.plots.labels import chosen_units, symbols
+from mdr_dask.plots.labels import chosen_units, printed_unit, symbols
 from mdr_dask.plots.labels import label as axis_label
 from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw, figure_of
@@ -101,6 +101,10 @@ def test_symbols_belong_to_the_models_of_this_package(model, label):
         assert axis_label("amplitude", data["amplitude"]) == label
     output = xr.DataArray([1.0], attrs={"units": "V", "long_name": "amplitude of the signal"})
     assert axis_label("amplitude", output) == "amplitude of the signal [V]"
+
+
+def test_powers_of_units_are_raised():
+    assert printed_unit("s N^-0.8 um^2") == "s N$^{-0.8}$ µm$^{2}$"
 
 
 def test_many_curves_have_a_colour_bar(groups):
