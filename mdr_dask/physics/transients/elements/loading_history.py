@@ -163,13 +163,7 @@ def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, sta
     return not line.periodic, u
 
 
-def follow_line(
-    line: CubicLine,
-    solid: Foundation,
-    schedule: Schedule,
-    state: State,
-    depth: float,
-) -> Response:
+def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: State, depth: float) -> Response:
     """Compute the motion of every element of a linear foundation under a line.
 
     During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
@@ -265,9 +259,9 @@ class Trace(NamedTuple):
 
     The friction is the drag F_x / (4 G L) divided by the load F_N / (4 G_inf L), in the unit of height divided by the
     unit of length. `before`, `at` and `after` are the friction in the steady state before t = 0, just after t = 0, and
-    in the final steady state, or NaN if the history does not end in steady sliding. At a jump, `friction` and `depth`
-    are the values just after the jump. `contact` is the largest fraction of the line in contact from t = 0 to the last
-    requested time.
+    in the final steady state, or NaN if the history does not end in steady forward sliding. At a jump, `friction` and
+    `depth` are the values just after the jump. `contact` is the largest fraction of the line in contact from t = 0 to
+    the last requested time.
     """
 
     before: float
@@ -296,9 +290,9 @@ def trace(
     """
     times = _snapped(times, np.array([piece.start for piece in pieces]))
     velocity, load_before = before
-    state, depth, status = steady_start(line, solid, abs(velocity), load_before)
+    state, depth, status = steady_start(line, solid, velocity, load_before)
     if status != Outcome.CONVERGED:
-        return _failed(times, Outcome(status))
+        return _failed(times, status)
     first, travel = _steady_friction(line, solid, velocity, load_before, state, depth), 0.0
     found: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
     for piece in pieces:
@@ -311,19 +305,13 @@ def trace(
         way, speed, load = piece.at(moments)
         part = follow_line(line, solid, Schedule(moments, travel + way, speed, load), state, depth)
         if part.status != Outcome.CONVERGED:
-            return _failed(times, Outcome(part.status))
+            return _failed(times, part.status)
         found.append((moments, part.drag / load, part.depth, part.contact))
         state, depth, travel = part.state, float(part.depth[-1]), float(travel + way[-1])
     moment, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
-    return Trace(
-        first,
-        float(friction[0]),
-        _end(line, solid, pieces[-1]),
-        _at(times, moment, friction),
-        _at(times, moment, depths),
-        float(contact.max()),
-        Outcome.CONVERGED,
-    )
+    at, after = float(friction[0]), _end(line, solid, pieces[-1])
+    last = np.searchsorted(moment, times, side="right") - 1  # at a jump, the moment just after the jump
+    return Trace(first, at, after, friction[last], depths[last], float(contact.max()), Outcome.CONVERGED)
 
 
 def _failed(times: FloatArray, outcome: Outcome) -> Trace:
@@ -340,7 +328,7 @@ def _steady_friction(
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
-    """Return the friction in the final steady state, or NaN if the history ends with an oscillation or at rest."""
+    """Return the friction in the final steady state, or NaN after an oscillation, at rest or in backward sliding."""
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:
         return np.nan
@@ -366,9 +354,3 @@ def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
     apart = distance > NEARLY * np.diff(moments, prepend=moments[0])
     apart[[0, -1]] = True
     return np.union1d(moments[apart], inside)
-
-
-def _at(times: FloatArray, moments: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the values at the given times, which are among the moments; at a jump, the value just after the jump."""
-    found: FloatArray = values[np.searchsorted(moments, times, side="right") - 1]
-    return found
