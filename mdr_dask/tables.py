@@ -453,20 +453,20 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 
     All numbers must have one decimal mark; otherwise TableError is raised.
     """
-    cells = grid.cells[rows]
-    places = [(row, column) for row, column in np.argwhere(grid.number[rows])]
-    of_marks = {mark: [place for place in places if mark in cells[place]] for mark in _DECIMALS}
-    possible = [mark for mark, form in _DECIMALS.items() if all(re.fullmatch(form, cells[place]) for place in places)]
-    if not possible or (len(possible) == 2 and all(of_marks.values())):
-        point, comma = of_marks["."][0], of_marks[","][0]
+    cells, number = grid.cells[rows], grid.number[rows]
+    texts: list[str] = cells[number].tolist()
+    with_mark = {mark: [place for place, text in enumerate(texts) if mark in text] for mark in _DECIMALS}
+    possible = [mark for mark, form in _DECIMALS.items() if all(map(re.compile(form).fullmatch, texts))]
+    if not possible or (len(possible) == 2 and all(with_mark.values())):
+        point, comma = (np.argwhere(number)[with_mark[mark][0]] for mark in ".,")
         what = (
-            f"expected decimal commas or decimal points, got both ({cells[point]!r}, and {cells[comma]!r} in "
-            f"{grid.lines[rows[comma[0]]]}): write one kind of decimals"
+            f"expected decimal commas or decimal points, got both ({cells[tuple(point)]!r}, and "
+            f"{cells[tuple(comma)]!r} in {grid.lines[rows[comma[0]]]}): write one kind of decimals"
         )
-        grid.require([rows[point[0]]], point[1], what)
-    decimal = max(possible, key=lambda mark: len(of_marks[mark]))
-    for place in places:
-        cells[place] = re.sub(rf"[.,{_GROUPS}]", lambda mark: "." if mark[0] == decimal else "", cells[place])
+        grid.require([rows[point[0]]], int(point[1]), what)
+    decimal = max(possible, key=lambda mark: len(with_mark[mark]))
+    kept = str.maketrans(decimal, ".", "".join(_DECIMALS).replace(decimal, "") + _GROUPS)
+    cells[number] = [text.translate(kept) for text in texts]
     return cells
 
 
