@@ -64,11 +64,6 @@ class Family(NamedTuple):
         others = self.factors != 0
         return Found(found.horizontal[others], ((high - low) / 2)[others])
 
-    def judged(self) -> np.ndarray:
-        """Return the errors of the factors over the half widths of their intervals."""
-        found = self.merged()
-        return np.abs(found.values - self.factors[self.factors != 0]) / found.stated
-
 
 def on_a_shape(shape: str, random: np.random.Generator, scatter: float = 0.01) -> Family:
     """Draw a family of ten curves of thirty points, two decades wide and 0.2 to 0.6 decades apart."""

@@ -53,8 +53,6 @@ class _Round:
 
     # The shape of the store.
     layout: tuple[Template, ...]
-    # For each group, the positions in the store at which the cases of the stage lie.
-    places: Places
     # For each group, two masks of its cases: the cases of the stage, and the cases that need the realisations of this
     # round.
     asked: list[BoolArray]
@@ -157,18 +155,17 @@ def _run_stages(job: _Job) -> Progress:
         facts = {"realisations": current.realisations[1], "done": progress.done, "failed": progress.failed}
         job.tell(Event("round ended", facts))
 
-    reached, stage = 0, job.stage
-    while last := _run_rounds(_without_answers(job) if stage.is_adaptive else job, run_round):
+    reached = 0
+    while last := _run_rounds(_without_answers(job) if job.stage.is_adaptive else job, run_round):
         reached = max(reached, last.realisations[1])
-        if not stage.is_adaptive:
+        if not job.stage.is_adaptive:
             break
-        after, event = following(job.url, stage, *stored_layout(stage, job.url), reached)
+        after, event = following(job.url, job.stage, *stored_layout(job.stage, job.url), reached)
         job.tell(event)
         if after is None:
             _end_stages(job, run_round, reached)
             break
-        stage = after
-        job = replace(job, stage=stage)
+        job = replace(job, stage=after)
     return replace(progress, wall_seconds=time.monotonic() - start)
 
 
@@ -208,7 +205,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
         asked = cases_of(job.stage, layout, places, job.stage.new)
         taken = tuple(np.where(mask, realisations, 0) for mask in asked)
-        last = _run_rounds(job, run_round, _Round(layout, places, asked, asked, (0, realisations), taken))
+        last = _run_rounds(job, run_round, _Round(layout, asked, asked, (0, realisations), taken))
         if last is None:
             return
         realisations = last.realisations[1]
@@ -216,7 +213,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
     asked = cases_of(job.stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in job.stage.meshes])
     nothing = [np.zeros_like(mask) for mask in asked]
     taken = tuple(mask.astype(np.int64) for mask in nothing)
-    rest = _Round(layout, places, asked, nothing, (0, realisations), taken)
+    rest = _Round(layout, asked, nothing, (0, realisations), taken)
     run_round(rest, [replace(cells, kept=0, failed=0) for cells in _find(job, rest)])
 
 
@@ -243,7 +240,7 @@ def _next(job: _Job, last: _Round | None) -> _Round:
             layout = _laid_out(job, layout, count)
     earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
     taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
-    return _Round(layout, places, asked, needed, (before, count), taken)
+    return _Round(layout, asked, needed, (before, count), taken)
 
 
 def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Template, ...]:
@@ -305,7 +302,10 @@ def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
     reported = time.monotonic()
     while True:
         here = {other.number for other in store.at_work(job.url)[1]}
-        late = _late(job, part, current)
+        groups = _find(replace(job, part=None, retry_failed=False), current)
+        numbers = owners(current.layout, part.count)
+        missing = (owner[cells.wanted | cells.spared] for owner, cells in zip(numbers, groups, strict=True))
+        late = {int(number) for each in missing for number in each}
         if not late:
             return True
         if late - here:
@@ -316,13 +316,6 @@ def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
             reported = time.monotonic()
             job.tell(Event("waiting for parts", {"parts": sorted(late)}, f"{what} {_named(late, part)}: waiting"))
         time.sleep(LOOK)
-
-
-def _late(job: _Job, part: Part, current: _Round) -> set[int]:
-    """Return the numbers of the parts whose results are still missing in a round."""
-    groups = _find(replace(job, part=None, retry_failed=False), current)
-    numbers = owners(current.layout, part.count)
-    return {int(n) for cells, owner in zip(groups, numbers, strict=True) for n in owner[cells.wanted | cells.spared]}
 
 
 def _named(numbers: set[int], part: Part) -> str:
