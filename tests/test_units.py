@@ -103,7 +103,7 @@ def test_models_declare_units_that_are_si(name):
 @pytest.mark.parametrize("name", models.NAMES)
 def test_every_quantity_declares_a_usual_value(name):
     """A number without a unit is compared with the usual value. A path is also given without dimension."""
-    for path, kind, info, _ in walk(models.load(name).parameters):
+    for path, kind, info in walk(models.load(name).parameters):
         if path != "path" and unit_of(kind, path.rpartition(".")[2]) not in ("1", "m^(1-n)", None):
             assert usual(info), path
 

@@ -27,9 +27,7 @@ LETTERS: dict[Any, Any] = {
 }
 #: Sizes of letters and lines, in points, for a figure on a screen.
 SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
-#: An inch, and the smallest and largest side of a figure, in metres.
-INCH = 0.0254
-LEAST, MOST = 0.02, 1.0
+INCH = 0.0254  # m
 #: Width of a column and height of a page of a journal in inches.
 COLUMN, TALLEST = 0.085 / INCH, 0.23 / INCH
 
@@ -117,7 +115,7 @@ def sides(text: str) -> tuple[float, float | None]:
         sides += [to_si(f"{match[3]} {match[4]}", "m")] if match[3] else []
     except ValueError as error:
         raise DataError(f"size: {error}") from None
-    if not all(LEAST <= side <= MOST for side in sides):
+    if not all(0.02 <= side <= 1.0 for side in sides):
         raise DataError(f"expected a size between 20 mm and 1 m, got {text!r}")
     inches = [side / INCH for side in sides]
     return inches[0], inches[1] if len(inches) > 1 else None

@@ -80,7 +80,7 @@ def render(description: Figure) -> Drawn:
     beside = _title(figure, description) + (_legend(figure, keys) if keys else 0.0)
     if asked.height is None:
         figure.set_size_inches(width, min(height + beside, page.TALLEST) if asked.width else height + beside)
-    _fit(figure, places)
+    _fit(figure)
     return figure
 
 
@@ -322,28 +322,22 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
         kept = kept[: len(kept) // 2]
 
 
-def _fit(figure: Drawn, places: list[Axes]) -> None:
+def _fit(figure: Drawn) -> None:
     """Break long labels and thin out ticks that overlap, again after each change of the size of the axes."""
     for _ in range(4):
         figure.draw_without_rendering()
         changed = False
         for axes in figure.axes:
             box = axes.get_window_extent()
-            for name, length in (("x", box.width), ("y", box.height)):
-                axis = getattr(axes, f"{name}axis")
-                text = axis.get_label_text().replace("\n", " ")
-                room = length / figure.dpi
-                broken = _broken(figure, text, room, axis.label.get_fontsize())
-                if broken != axis.get_label_text():
-                    axis.set_label_text(broken)
-                    changed = True
-                changed |= _thin(figure, axis, name)
-            if axes.get_title():
-                title = _broken(
-                    figure, axes.get_title().replace("\n", " "), box.width / figure.dpi, axes.title.get_fontsize()
-                )
-                changed |= title != axes.get_title()
-                axes.set_title(title)
+            for text, length in (
+                (axes.xaxis.label, box.width),
+                (axes.yaxis.label, box.height),
+                (axes.title, box.width),
+            ):
+                broken = _broken(figure, text.get_text().replace("\n", " "), length / figure.dpi, text.get_fontsize())
+                changed |= broken != text.get_text()
+                text.set_text(broken)
+            changed |= _thin(figure, axes.xaxis, "x") | _thin(figure, axes.yaxis, "y")
         if not changed:
             return
 
