@@ -198,12 +198,7 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
 
 
 #: Names of the regimes, in the order of the rows of `limiting_films`.
-REGIMES: tuple[str, ...] = (
-    "rigid isoviscous",
-    "rigid piezoviscous",
-    "elastic isoviscous",
-    "elastic piezoviscous",
-)
+REGIMES = ("rigid isoviscous", "rigid piezoviscous", "elastic isoviscous", "elastic piezoviscous")
 
 #: The number ``(h_min/R) W/U`` for a rigid parabola and an isoviscous liquid with the Reynolds exit condition
 #: (Kapitza).

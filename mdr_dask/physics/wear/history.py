@@ -94,7 +94,7 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
     if image[-1] <= depth:
         raise ValueError(
             f"at the depth {depth:.4g} the contact reaches beyond the table or grid, which ends at "
-            f"r = {grid.nodes[-1]:.4g} contact radii; increase reach, or extend the table"
+            f"r = {grid.nodes[-1]:.4g} contact radii; lower the load or extend the table"
         )
     load = np.maximum(depth - image, 0.0)
     free = np.maximum(1.0 - load / block.slip_share, 0.0)

@@ -166,7 +166,7 @@ def worn_image(profile: Profile, scar: Scar) -> Function:
 
 
 def worn_profile(profile: Profile, scar: Scar) -> Function:
-    """Return the worn profile f(r)."""
+    """Return the worn profile f(r), which is nowhere below the virgin profile."""
 
     def height(radius: FloatArray) -> FloatArray:
         inside = (radius > scar.border) & (radius < scar.radius)
