@@ -456,9 +456,14 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
     cells, number = grid.cells[rows], grid.number[rows]
     texts: list[str] = cells[number].tolist()
     with_mark = {mark: [place for place, text in enumerate(texts) if mark in text] for mark in _DECIMALS}
-    possible = [mark for mark, form in _DECIMALS.items() if all(map(re.compile(form).fullmatch, texts))]
+    forms = {mark: re.compile(form) for mark, form in _DECIMALS.items()}
+    unlike = {
+        mark: [place for place, text in enumerate(texts) if not form.fullmatch(text)] for mark, form in forms.items()
+    }
+    possible = [mark for mark in forms if not unlike[mark]]
     if not possible or (len(possible) == 2 and all(with_mark.values())):
-        point, comma = (np.argwhere(number)[with_mark[mark][0]] for mark in ".,")
+        places = np.argwhere(number)
+        point, comma = (places[(unlike[other] or with_mark[mark])[0]] for mark, other in (".,", ",."))
         what = (
             f"expected decimal commas or decimal points, got both ({cells[tuple(point)]!r}, and "
             f"{cells[tuple(comma)]!r} in {grid.lines[rows[comma[0]]]}): write one kind of decimals"
@@ -534,7 +539,7 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
         found.append((column, written, is_logarithm))
     missing = [column for column in columns if column.needed and column not in [meant for meant, _, _ in found]]
     for column in missing:
-        places = [place for place, (_, unit, _) in enumerate(found) if fits(unit, column)]
+        places = [place for place, (meant, unit, _) in enumerate(found) if meant is None and fits(unit, column)]
         alike = [each for each in columns if fits(each.unit, column)]
         if column.unit != "1" and alike == [column] and len(places) == 1:
             found[places[0]] = column, found[places[0]][1], False

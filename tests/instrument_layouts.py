@@ -155,6 +155,8 @@ READ = {
 REFUSED = {
     "points and commas": ("velocity [mm/s];mu\n1.5;0,322\n1.7;0,48\n",
         FRICTION, "commas:2:1: expected decimal commas or decimal points, got both ('1.5', and '0,322' in line 2)"),
+    "millions and decimals": ("velocity [mm/s];mu\n1,000,000;0,48\n",
+        FRICTION, "expected decimal commas or decimal points, got both ('1,000,000', and '0,48' in line 2)"),
     "thousands or decimals": ("velocity [mm/s];mu\n1.000;1,125\n2.000;1,250\n",
         FRICTION, "expected decimal commas or decimal points, got both"),
     "word between numbers": ("sample;f [Hz];E' [MPa]\nA;1;2\nB;bad;worse\nC;2;3\n",
