@@ -172,11 +172,6 @@ class FrettingWear(Parameters):
     )
     points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
 
-    @field_validator("history", mode="before")
-    @classmethod
-    def _as_tuple(cls, value: object) -> object:
-        return tuple(value) if isinstance(value, list) else value
-
     @property
     def dimensionless(self) -> bool:
         """Whether the campaign is dimensionless, with lengths in units of a0 and heights in units of d0."""
@@ -216,6 +211,8 @@ class FrettingWear(Parameters):
 
     @model_validator(mode="after")
     def _history(self) -> FrettingWear:
+        if self.wear_rule == "fast" and self.hold == "force":
+            raise ValueError(FAST_AT_DEPTH)
         if self.history and self.wear_rule != "exact":
             raise ValueError(f"expected wear_rule: exact, because a history is given, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
@@ -225,12 +222,6 @@ class FrettingWear(Parameters):
             raise ValueError(
                 "last_radius is a length: in a dimensionless campaign, give extent (last radius / a0) instead"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _fast_rule(self) -> FrettingWear:
-        if self.wear_rule == "fast" and self.hold == "force":
-            raise ValueError(FAST_AT_DEPTH)
         return self
 
     def notes(self) -> tuple[str, ...]:

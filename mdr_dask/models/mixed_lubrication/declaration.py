@@ -204,13 +204,9 @@ class MixedLubrication(Parameters):
 
     def problem(self) -> str:
         """Return the reason why the case cannot be computed, or an empty string."""
-        problem = self._problem_of_surfaces()
-        problem = problem or self._problem_of_points()
+        problem = self._problem_of_surfaces() or self.oil_data().outside(self.temperature)
         if problem:
             return problem
-        outside = self.oil_data().outside(self.temperature)
-        if outside:
-            return outside
         try:
             source = self.source()
             return source.problem(self.perimeter) or self._problem_of_width(source)
@@ -229,20 +225,6 @@ class MixedLubrication(Parameters):
         if one.profile is None and self.rms_roughness is not None:
             return "surface_1 and surface_2 replace rms_roughness: leave out one or the other"
         return "" if self.hurst is None else "surface_1 and surface_2 replace hurst: leave out one or the other"
-
-    def _problem_of_points(self) -> str:
-        if self.points != "auto" or (self.surface_1 is not None and self.surface_1.profile is not None):
-            return ""
-        if self.shortest_wavelength == "auto":
-            return ""
-        least = LEAST_PER_WAVE * self.perimeter / MOST_POINTS
-        if self.shortest_wavelength < least:
-            wave, limit = distinguishable(self.shortest_wavelength, least, digits=4)
-            return (
-                f"expected a shortest_wavelength of at least {limit} m, {LEAST_PER_WAVE} spacings of {MOST_POINTS} "
-                f"points, got {wave} m"
-            )
-        return ""
 
     def _problem_of_width(self, source: Source) -> str:
         length = source.length(self.perimeter)

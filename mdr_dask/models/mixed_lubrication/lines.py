@@ -22,7 +22,7 @@ def points_for(modes: int) -> tuple[int, ...]:
     """Return the number of points of each grid, from coarse to fine; `modes` is the number of waves of a line."""
     from scipy.fft import next_fast_len
 
-    least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
+    least = next_fast_len(min(int(np.ceil(LEAST_PER_WAVE * modes)), MOST_POINTS), real=True)
     return tuple(least * 2**k for k in range(1 + DOUBLINGS) if least * 2**k <= MOST_POINTS)
 
 
@@ -49,10 +49,7 @@ class _Random:
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
         if 2 * self.modes > self.points[-1]:
             wave, least = distinguishable(perimeter / self.modes, 2 * perimeter / self.points[-1], digits=4)
-            return (
-                f"expected a shortest wavelength of at least two point spacings, {least} m, got {wave} m "
-                "(increase points)"
-            )
+            return f"expected a shortest wavelength of at least two point spacings, {least} m, got {wave} m"
         return ""
 
     def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,8 @@ import math
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, match
@@ -83,8 +85,6 @@ def read_scan(file: DataFile, units: Units) -> Scan:
     `units` are those that the user states. Raise DataError if a unit is missing, or if the file and the user state
     different ones.
     """
-    import numpy as np
-
     from mdr_dask.physics.surfaces.maps import require_few_missing
 
     if file.name.lower().endswith(".npy"):
@@ -230,8 +230,6 @@ def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
 
 
 def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
-    import numpy as np
-
     if channel.dim != 2:
         raise DataError(f"{file.name}: expected a map, got a line scan (write `scan` instead of `map`)")
     surface, unit = _topography(file, channel, units)
@@ -242,8 +240,6 @@ def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
 
 def _array(file: DataFile) -> FloatArray:
     """Return the rows of a numpy array file."""
-    import numpy as np
-
     try:
         array: Any = np.load(io.BytesIO(file.read_bytes()), allow_pickle=False)
     except (ValueError, EOFError, OSError) as problem:
@@ -261,8 +257,6 @@ def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
     A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z; its rows have ascending y. An
     ESRI text begins with names and numbers; its rows have descending y.
     """
-    import numpy as np
-
     kind = {"dsaa": "Surfer", "ncols": "ESRI"}.get("".join(lines[:1]).casefold().partition(" ")[0].strip())
     if kind is None:
         return None
@@ -285,8 +279,6 @@ def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
 
 def _grid_of_text(file: DataFile) -> _Grid:
     """Return the heights of a text file, with the units and spacings stated in it."""
-    import numpy as np
-
     lines = file.read_text().replace('"', "").splitlines()
     if (grid := _grid_file(file, lines)) is not None:
         return grid
@@ -447,8 +439,6 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     If the table has no names, the positions are the column that only rises or only falls. A table of heights alone
     needs a spacing.
     """
-    import numpy as np
-
     text = file.read_text()
     sheet = read_sheet(text, file.name)
     if sheet.names:

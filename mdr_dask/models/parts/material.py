@@ -216,16 +216,17 @@ def frequencies(material: Material) -> tuple[float, float] | None:
     return fit.range[0] / factor, fit.range[1] / factor
 
 
-def fit_notes(material: Material | None) -> tuple[str, ...]:
+def fit_notes(material: Material) -> tuple[str, ...]:
     """Return a note with the error of a Prony series that was fitted to a power law or a table."""
-    fit = None if material is None else _fit_of(material)
-    if material is None or fit is None:
+    fit = _fit_of(material)
+    if fit is None:
         return ()
     what, how = "power law", ""
     if material.dma_table is not None:
         what, how = f"table {material.dma_table.file.name}", one_curve(material.dma_table, material.law).superposed
     lowest, highest = fit.range
-    errors = [f"{error:.1%} in {modulus}" for modulus, error in _errors(fit).items()]
+    both = (("G'", fit.storage_error), ("G''", fit.loss_error))
+    errors = [f"{error:.1%} in {modulus}" for modulus, error in both if np.isfinite(error)]
     return (
         f"{what}: {how and how + '; '}{fit.solid.times.size} Prony terms for {lowest:.3g} to {highest:.3g} rad/s, "
         f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
@@ -254,8 +255,3 @@ def _table_notes(material: Material) -> tuple[str, ...]:
         ends = f"{shown(least, 'Pa')} to {shown(most, 'Pa')}"
         notes.append(f"shear moduli of {ends} are not those of a solid (is the unit right?)")
     return tuple(f"table {table.file.name}: {note}" for note in notes)
-
-
-def _errors(fit: SeriesFit) -> dict[str, float]:
-    both = {"G'": fit.storage_error, "G''": fit.loss_error}
-    return {modulus: error for modulus, error in both.items() if np.isfinite(error)}

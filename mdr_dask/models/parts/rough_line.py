@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
@@ -89,8 +91,6 @@ class OfSurface:
 
 @lru_cache(maxsize=64)
 def _height(line: OfSurface) -> float:
-    import numpy as np
-
     lines = lines_of(line.surface, line.length, line.points // 2)
     return float(np.sqrt(np.mean([np.sum(amplitude**2) / 2 for amplitude in lines])))
 
@@ -137,8 +137,6 @@ class Smooth:
 
     def waves(self, seed: int, realisation: int) -> Waves:
         """Return a line without waves."""
-        import numpy as np
-
         from mdr_dask.physics.surfaces.waves import Waves
 
         return Waves(np.zeros(0, np.complex128), self.points)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
@@ -158,8 +159,6 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
 
     There is one line for each file. Raise DataError if no wave of the line lies in the range of the spectrum.
     """
-    import numpy as np
-
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):
         if not np.any(line):

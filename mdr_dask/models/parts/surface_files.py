@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field
 
 from mdr_dask.errors import DataError
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
     from mdr_dask.physics.surfaces.maps import MapSpectrum
     from mdr_dask.physics.surfaces.measured import MeasuredLine
-    from mdr_dask.physics.surfaces.scans import Cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # assumed relative error of every point of a tabulated spectrum of straight profiles
@@ -139,8 +139,6 @@ def is_spectrum(text: str) -> bool:
 @lru_cache(maxsize=64)
 def _tabulated(file: DataFile) -> Found:
     """Return the spectrum of a table."""
-    import numpy as np
-
     from mdr_dask.physics.surfaces.scans import averaged, of_cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
@@ -182,8 +180,6 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
     """Return warnings if a line may contain the form of the measured part, or if it is steeper than 45 degrees."""
-    import numpy as np
-
     place = np.linspace(-1, 1, line.height.size)
     level, curved = (line.height - np.polyval(np.polyfit(place, line.height, order), place) for order in (1, 2))
     form = _form(level, curved) if detrend != "parabola" else ()
@@ -192,8 +188,6 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
     """Return a warning if a parabola explains most of the levelled heights: they may contain the form of the part."""
-    import numpy as np
-
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
     if not rest < (1 - FORM) * square:
         return ()
@@ -212,31 +206,22 @@ def _steepness(slope: float) -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def scanned(scans: ScanFiles, file: DataFile) -> Found:
-    """Return the spectrum of the surface from one scan."""
-    from mdr_dask.physics.surfaces.scans import cut_of_lines
+    """Return the spectrum of the surface from one scan, without waves that are only noise."""
+    from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, cut_of_lines, of_cut
+    from mdr_dask.physics.surfaces.self_affine import noise_limit
 
     line = line_of_scan(scans, file)
     with file.in_errors():
-        found = of_surface_cut(cut_of_lines([line], scans.window == "hann"))
-    return found._replace(remarks=(*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend)))
-
-
-def of_surface_cut(cut: Cut) -> Found:
-    """Return the spectrum of the surface from the spectrum of a straight profile, without waves that are only noise."""
-    import numpy as np
-
-    from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, of_cut
-    from mdr_dask.physics.surfaces.self_affine import noise_limit
-
-    limit = noise_limit(cut, NOISE_SLOPE, NOISE_TAIL)
-    return Found(of_cut(cut.until(limit)), 0.0 if np.isinf(limit) else 2 * np.pi / limit)
+        cut = cut_of_lines([line], scans.window == "hann")
+        limit = noise_limit(cut, NOISE_SLOPE, NOISE_TAIL)
+        spectrum = of_cut(cut.until(limit))
+    remarks = (*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend))
+    return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, remarks)
 
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
     """Return the spectrum of one map, averaged over all directions or found from profiles along the given direction."""
-    import numpy as np
-
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
@@ -255,8 +240,6 @@ def anisotropic(maps: MapFiles, file: DataFile) -> str:
 
     The text is empty if the map is isotropic, or if the user gives a sliding direction.
     """
-    import numpy as np
-
     rings = levelled_map(maps, file).spectrum
     if maps.direction is not None or rings.anisotropy() <= MOST_ANISOTROPY:
         return ""
@@ -286,8 +269,6 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
 
     Raise DataError if the file holds no map, or if too many points are missing.
     """
-    import numpy as np
-
     from mdr_dask.physics.surfaces.maps import filled, outliers, require_points, spectrum_of_map, without_trend
 
     surface, remarks = read_map(file, Units(maps.unit, maps.x_unit, maps.spacing, maps.spacing_y))
