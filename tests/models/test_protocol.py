@@ -175,7 +175,7 @@ def test_a_table_that_contradicts_the_state_before_it_is_a_failed_case(tmp_path:
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ("0,0.05\n2,0.1\n1,0.1", "expected times that start at 0 and do not decrease"),
+        ("0,0.05\n2,0.1\n1,0.2", "expected times that start at 0 and do not decrease"),
         ("0,0.05\n2,x", "expected a number, got 'x'"),
     ],
 )
