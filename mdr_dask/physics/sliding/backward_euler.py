@@ -51,7 +51,7 @@ ROWS = 7
 class Nodal(NamedTuple):
     """Heights of a line at its nodes, and the rise from the previous node to each node.
 
-    The bounds and sums of every block are those of `_blocks`. A periodic line ends at its highest node.
+    `blocks` contains the results of `_blocks`. A periodic line ends at its highest node.
     """
 
     height: FloatArray
@@ -61,7 +61,7 @@ class Nodal(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Sliding cases: v tau in cells, the decay lambda per step, and the penetration of the highest node."""
+    """Sliding cases: v tau in cell widths, the decay lambda per step, and the penetration of the highest node."""
 
     deborah: FloatArray
     decay: FloatArray
@@ -71,10 +71,11 @@ class Moving(NamedTuple):
 class Lanes(NamedTuple):
     """Work arrays of a sweep over cases.
 
-    `state`, shape (ROWS, cases), is the state of each case; after the sweep its rows `U` and `FADE` belong to the end
-    of the line. `packed` contains state, decay and depth of the cases in the queue in neighbouring columns. `queue`
-    contains the cases in which contact begins or ends in the current block. `sums`, shape (SUMS, cases), contains the
-    sum of u, its derivative with respect to the depth, and (1 - lambda) F_x / (4 G).
+    `state`, shape (ROWS, cases), is the state of each case; after the sweep the rows `U` and `FADE` contain the
+    displacement at the end of the line and its derivative with respect to the depth. `packed` contains copies of state,
+    decay and depth of the cases in the queue, one column per case. `queue` contains the cases in which contact begins
+    or ends in the current block. `sums`, shape (SUMS, cases), contains the sum of u, its derivative with respect to the
+    depth, and (1 - lambda) F_x / (4 G).
     """
 
     state: FloatArray
@@ -111,7 +112,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    The other cases are written to the queue; their number is returned.
+    The indices of the other cases are written to the queue. Return how many there are.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -138,7 +139,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
 
 @jit
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
-    """Move the element of each case from node to node, and update the sums `LOAD`, `RATE` and `LOSS` of the case."""
+    """Move one element per case from node to node, and update the sums `LOAD`, `RATE` and `LOSS` of each case."""
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
         h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
@@ -269,7 +270,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """Write the number of nodes in contact of every case to `touched`, and the rms rise at these nodes to `slope`."""
+    """For every case, write the number of nodes in contact to `touched`, and the rms rise at these nodes to `slope`."""
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0

@@ -1,12 +1,13 @@
 """Full contact of any linear solid with a rough plane; the problem is linear, so that each wave is solved separately.
 
-The displacement is u = d + h, with the depth d and the height h. The pressure of wave k is G*(q_k v) c_k, with the
-complex modulus G*, the wavenumber q_k and the amplitude c_k (thesis eq. 3.14 for the Kelvin solid). The drag is
-therefore a sum over the spectrum and does not depend on the phases.
+The displacement is u = d + h, with the depth d and the height h. The height is a sum of waves. Wave k, with the
+wavenumber q_k and the amplitude c_k, causes the pressure G*(q_k v) c_k, where G* is the complex modulus (thesis eq.
+3.14 for the Kelvin solid). The drag is therefore a sum over the spectrum and does not depend on the phases.
 
 Contact is full if the pressure is positive everywhere. The pressure is computed at m nodes, two for each Nyquist point.
-Between the nodes, a sum of waves with at most k periods on the line is at most 1 / cos(pi k / m) times as large as its
-largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
+Between the nodes, the varying part of the pressure may be larger than at the nodes, but at most by a factor of
+1 / cos(pi K / m), where K is the number of periods of the shortest wave on the line (Ehlich and Zeller, Z. Angew. Math.
+Mech. 44, T22, 1964).
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from mdr_dask.physics.surfaces.waves import series
 def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
     """Return the steady states of the cases in full contact with a plane; all other cases get `Outcome.INVALID`.
 
-    The terms are pairs of G_m / G_inf and tau_m v / L; a Kelvin solid has none. The Deborah number is eta v / (G_inf L)
-    of the dashpot, and the load F_N / (4 G_inf L) in the unit of height. In full contact this load is equal to the mean
-    displacement.
+    `terms` contains the two numbers G_m / G_inf and tau_m v / L for each Prony term; it is empty for a Kelvin solid.
+    The Deborah number of a case is that of the dashpot, eta v / (G_inf L). The load is F_N / (4 G_inf L), in the unit
+    of height; in full contact it is equal to the mean displacement.
     """
     deborah, loads = cases
     pressure, slope = line.nodes
@@ -35,10 +36,12 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     if terms:
         relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
         pressure = pressure + series(waves * relaxing, nodes)
-    # the drag is a mean over the nodes, equal to the sum over the spectrum; the mean of height times slope is 0
+    # the drag is the mean of pressure times slope over the nodes; the static pressure adds nothing to it, because the
+    # mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    # most cases without full contact are found at the nodes of the largest static and the largest viscous pressure
+    # two nodes show for most cases that contact is not full: the node with the largest pressure without the dashpot,
+    # and the node with the largest slope
     worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch

@@ -1,10 +1,10 @@
 """One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
 
-All lengths are in cells, a slope is the rise over one cell, and ``deborah`` is v tau in cells. Heights are measured
-from the highest point of the line, so that the penetration is w = depth + height with depth > 0. The displacement of an
-element is u = w in contact; after contact ends, u and du/d(depth) decay as exp(-s / deborah) with the distance s. A
-change of the depth also shifts the places where contact begins and ends, but this changes the load only to second
-order.
+The unit of length is the cell width, a slope is the rise over one cell, and ``deborah`` is the distance v tau in cells.
+Heights are measured from the highest point of the line, so that the penetration is w = depth + height with depth > 0.
+The displacement of an element is u = w in contact; after contact ends, u and du/d(depth) decay as exp(-s / deborah)
+with the distance s. A change of the depth also shifts the places where contact begins and ends, but this changes the
+load only to second order.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def write_barriers(
         first = -(h0 + deborah * a)
         last = -(height[i + 1] + deborah * leave[i])
         highest = first if first > last else last
-        # force - depth = p + q x + r x^2 + c x^3, which may have its minimum inside the cell
+        # force - depth = p + q x + r x^2 + c x^3; the minimum of this cubic may be inside the cell
         q, r = a + 2 * deborah * b, b + 3 * deborah * c
         near, far = first - q / 3, last + (q + 2 * r + 3 * c) / 3
         x = summit(-q, -r, -c) if max(near, far) > highest else NONE
@@ -120,7 +120,7 @@ def _decayed(x: float) -> float:
 def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
     """Return the first place between `start` and 1 where the force falls to 0, or `NONE`.
 
-    The force is w + deborah w', with w = w0 + a x + b x^2 + c x^3; it must not be negative at `start`.
+    The force is w + deborah w', with w = w0 + a x + b x^2 + c x^3. At `start`, the force must not be negative.
     """
     # search each monotone piece of the cubic force; because of rounding, the force at `start` may be negative
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
@@ -160,7 +160,10 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 
 class FreeElement(NamedTuple):
-    """A free element with the displacement u at the place `start` of a cell with w = w0 + a x + b x^2 + c x^3."""
+    """A free element, with the displacement u at the place `start` of a cell.
+
+    The penetration in the cell is w = w0 + a x + b x^2 + c x^3.
+    """
 
     w0: float
     a: float
@@ -234,11 +237,11 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return four integrals over a free recovery: of u, of du/d(depth), the drag, and the derivative of the drag.
+    """Return four contributions of a free recovery: load, derivative of the load, drag, and derivative of the drag.
 
-    The integral of u is deborah times the decrease of u, and the drag is half the decrease of u^2. The derivative of
-    the drag with respect to the depth includes the shift of the place where contact begins again; the line has the
-    slope `slope` there.
+    Derivatives are with respect to the depth. The contribution to the load is the integral of u, which is deborah times
+    the decrease of u, and the drag is half the decrease of u^2. The derivative of the drag includes the shift of the
+    place where contact begins again; the line has the slope `slope` there.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -272,8 +275,8 @@ def sweep_cells(
     The limits of a block that are still NaN are written to `barriers` when they are needed. The entries of `sums` are:
     the integral of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its
     derivative; the length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not
-    periodic is in contact, otherwise 0. `places`, shape (2, patches), receives the positions where the
-    first patches begin and end.
+    periodic is in contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the patches begin
+    and end; patches beyond its capacity are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -293,7 +296,8 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # `left` is the place where the last contact ended, `u` the displacement there, `free` that at the start of the cell
+    # `left` is the place where the last contact ended, `u` the displacement of the element at this place, and `free`
+    # its displacement at the start of the current cell
     u = free = left = 0.0
     # a period ends at the highest point, inside the last cell, which is a copy of the first cell
     last = n if cells.periodic and start > 0 else n - 1

@@ -21,7 +21,10 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19); at about 1, only the fronts of the asperities are in contact."""
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19).
+
+    If it is about 1, only the fronts of the asperities are in contact.
+    """
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
 
@@ -31,7 +34,7 @@ def alpha(hurst: Any) -> Any:
 
 
 def full_contact(force: Any, velocity: Any) -> Any:
-    """Return mu / slope in full contact, where mu = 4 eta v L slope^2 / F_N exactly (eq. 3.14)."""
+    """Return mu / slope in full contact; the underlying law mu = 4 eta v L slope^2 / F_N is exact (eq. 3.14)."""
     return 4 * math.sqrt(2) * velocity / force
 
 
@@ -60,7 +63,7 @@ def indenter_low(
 def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     """Return mu / (sqrt 2 slope) of a rough indenter (eq. 3.40, 3.43).
 
-    The argument `xi` is this ratio from the law for low velocity.
+    The argument `xi` is mu / (sqrt 2 slope) with the value of mu at low velocity, from `indenter_low`.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)
 

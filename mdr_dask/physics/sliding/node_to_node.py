@@ -1,13 +1,13 @@
 """Steady sliding of a Kelvin foundation along a periodic line: a fast, approximate solver for many cases at once.
 
-All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
-a cell, the penetration w (depth plus height) is a cubic. The places where contact begins and ends are computed
-approximately. The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in
-contact and of u^2 / De out of contact. All terms are positive, so that there is no cancellation in slow sliding. In
-full contact the results are exact on any grid.
+The unit of length is the cell width: neighbouring nodes have the distance 1, and the Deborah number De is the distance
+v tau in cells. Inside a cell, the penetration w (depth plus height) is a cubic. The places where contact begins and
+ends are computed approximately. The load is the integral of w in contact and of u out of contact. The drag is the
+integral of De w'^2 in contact and of u^2 / De out of contact. All terms are positive, so that there is no cancellation
+in slow sliding. In full contact the results are exact on any grid.
 
-If a block of cells is entirely in contact or entirely free in a case, its sums have closed forms. Otherwise the element
-moves from cell to cell. The results of a case do not depend on the other cases.
+If a block of cells is entirely in contact or entirely free in a case, its sums have closed forms. Otherwise the solver
+follows one element from cell to cell. The results of a case do not depend on the other cases.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ IN_A_TILE = 5
 class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
-    `height` (relative to the first node), `slope` (rise per cell) and `ends` (from `_ends_of`, or empty) begin with the
-    last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. A row of
-    `blocks` contains, for one block: upper bound of the height, height of the lowest node, smallest slope at a node,
-    integral of the height, and integral of the squared slope. `top` is the height of the first node. `rise` is the
-    height of the highest point, in the cell before the first node, above the first node. On coarse grids the first node
-    is the highest node, and `rise` is 0.
+    `height` is relative to the first node, `slope` is the rise per cell, and `ends` contains the results of `_ends_of`
+    or is empty. These arrays begin with the last `BEFORE` nodes of the previous period, and end with the first `AFTER`
+    nodes of the next period. A row of `blocks` contains, for one block: upper bound of the height, height of the lowest
+    node, smallest slope at a node, integral of the height, and integral of the squared slope. `top` is the height of
+    the first node in the given line. The highest point of the line is in the cell before the first node; `rise` is its
+    height above the first node. On coarse grids the first node is the highest node, and `rise` is 0.
     """
 
     height: FloatArray
@@ -130,8 +130,9 @@ def _integrals(
     """Write the integrals over each cell: of the height to `mean`, and of the squared slope to `square`.
 
     The input arrays begin one node before the first cell; `square` needs one entry more than there are cells. The
-    trapezium rule is corrected with the results of `_ends_of`. If these are empty, the rule is corrected by the
-    Euler-Maclaurin formula, with derivatives from heights and slopes at neighbouring nodes.
+    trapezium rule is corrected with `of_height` and `of_square`, the results of `_ends_of`. If these arrays are empty,
+    the rule is corrected by the Euler-Maclaurin formula, with derivatives from heights and slopes at neighbouring
+    nodes.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -224,7 +225,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
 
 
 def with_summit(line: Nodes) -> Nodes:
-    """Return the line with the computed `rise`; the highest point must be in the cell before the first node."""
+    """Compute `rise`, and return the line with it; the highest point must be in the cell before the first node."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))
     refine(line, BEFORE - 1, 1, table, height, slope)
@@ -240,9 +241,9 @@ ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
 LAST_STEP = 0.03  # the search ends after a step of at most this fraction of the depth; results are extrapolated
 SECANT_ERROR = 0.1  # assumed error of the extrapolation over the last step, divided by the extrapolated change
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # LAST_STEP and allowed error of the drag on grids for a first guess
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # in `_start`, used instead of LAST_STEP and of the allowed error of the drag
 ROUNDING = 1e-12  # smaller relative steps of the depth are rounding errors
-ORDER = 3.0  # order of convergence; measured: 3.3 (four inside cells, lower where contact begins or ends)
+ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
 ROWS = 15
@@ -304,11 +305,11 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return the place in a cell where the force falls to 0, the penetration w there, and the remaining fraction of w.
+    """Return the place in a cell where contact ends, w there, and the fraction of w left at the end of the cell.
 
-    The remaining fraction is the displacement at the end of the cell, where the element is free, divided by w. The
-    Deborah number is `r`, and `inverse` is 1 / r. The force falls from `force` at `begins` to `force_end` at the end of
-    the cell. Linear interpolation gives a first estimate of the place, which one Newton step improves.
+    Contact ends where the force falls to 0; from there on, the element recovers freely. The Deborah number is `r`, and
+    `inverse` is 1 / r. The force falls from `force` at `begins` to `force_end` at the end of the cell. Linear
+    interpolation gives a first estimate of the place, which one Newton step improves.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -325,11 +326,11 @@ def _contact_end(
 
 @jit_inline
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
-    """Return the place where a free element meets the line, and the remaining fraction of the displacement u.
+    """Return the place where a free element meets the line, and the fraction of its displacement u that remains there.
 
-    The displacement is u at the start of the cell; `inverse` is 1 / De. At the place `last` the gap between element and
-    line is `gap_last` < 0. A parabola through the gaps at the start of the cell and at `last` gives a first estimate of
-    the place, which one Newton step improves.
+    The displacement of the element is u at the start of the cell; `inverse` is 1 / De. At the place `last` the gap
+    between element and line is `gap_last` < 0. A parabola through the gaps at the start of the cell and at `last` gives
+    a first estimate of the place, which one Newton step improves.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -351,9 +352,10 @@ def _contact_in_cell(
 ) -> tuple[bool, float, float, float, float]:
     """Return whether a free element comes into contact in a cell, and four numbers about the end of the contact.
 
-    The displacement is u at the start of the cell, and would be `kept` at its end without contact. The four numbers
-    are: the place where the contact ends (1 if contact continues in the next cell); w at this place; the fraction of w
-    that remains at the end of the cell; and the gap between the line and an element without contact at this place.
+    The displacement of the element is u at the start of the cell; without contact it would be `kept` at the end of the
+    cell. The four numbers are: the place where the contact ends (1 if contact continues in the next cell); w at this
+    place; the fraction of w that remains at the end of the cell; and the gap that an element without contact would have
+    at this place.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -372,7 +374,7 @@ def _contact_in_cell(
 
 @jit
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
-    """Move the element of a case along a tile, and add the integrals over the tile to the sums of the case."""
+    """Move one element of case k along a tile, and add the integrals over the tile to the sums of this case."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
     decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
     u, fade = workspace[U + k], workspace[FADE + k]
@@ -440,7 +442,7 @@ def _pass_block(
 ) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    The other cases are written to the queue; their number is returned.
+    The indices of the other cases are written to the queue. Return how many there are.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -539,10 +541,10 @@ def _search(
     """Find the depths of cases on a grid by Newton's method; extrapolate the results over the last step of the depth.
 
     The search ends after a step of at most `last_step` times the depth, if the extrapolation changes the drag so little
-    that its estimated relative error is at most `error`. `depths` are penetrations of the summit: first guesses,
-    replaced by solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms of the results with
-    respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS), receives drag, contact
-    fraction and contact slope, and is not changed if no depth is found.
+    that the estimated relative error of the drag is at most `error`. `depths` contains the penetrations of the summit;
+    the first guesses are replaced by the solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms
+    of the results with respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS),
+    receives drag, contact fraction and contact slope, and is not changed if no depth is found.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -592,7 +594,7 @@ def _search(
 
 
 class NodeToNode:
-    """Cases on a rough plane, for a solution on a sequence of finer and finer grids.
+    """Cases on a rough plane that are solved on finer and finer grids.
 
     `error` is the largest relative error of the drag due to the search for the depth.
     """
@@ -638,11 +640,12 @@ class NodeToNode:
         return self._solution(results, self._depth, 1)
 
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
-        """Return the results on a grid.
+        """Return the results on a grid, with the errors due to a contact patch that the grid does not resolve.
 
-        A contact patch between two nodes may be missing on two successive grids. It is at most about one cell long,
-        because a longer patch contains nodes. It decreases the rms slope of the contact, because the slope is small
-        near a summit; the relative decrease is at most half the relative increase of the length.
+        A contact patch between two nodes may be missing on two successive grids. Such a patch is at most about one cell
+        long, because a longer patch contains nodes. If the patch were included, the length in contact would increase,
+        and the rms slope of the contact would decrease, because the slope is small near a summit. The relative decrease
+        of the slope is at most half the relative increase of the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -54,13 +54,13 @@ class PronyTerms:
 
 @dataclass(frozen=True)
 class Request:
-    """The requested accuracy or the given grid, and the requested results.
+    """The requested results, and either the requested accuracy or a given grid.
 
-    `accuracy` is relative, as in `FLOORS`. `oversampling` is the number of nodes per Nyquist point; "auto" selects the
-    smallest number that meets the accuracy. The scheme for a Kelvin solid is "hermite" (cubic cells) or
-    "backward_euler" (the time steps of the papers). `with_errors` is only used for a Kelvin solid on a given grid; in
-    all other cases the errors are always estimated. `contact` states whether contact fraction and contact slope are
-    requested, which need finer grids than the other results.
+    `accuracy` is the allowed relative error; for small values see `FLOORS`. `oversampling` is the number of nodes per
+    Nyquist point; "auto" selects the smallest number that meets the accuracy. The scheme for a Kelvin solid is
+    "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). `with_errors` is only used for a Kelvin
+    solid on a given grid; in all other cases the errors are always estimated. `contact` states whether contact fraction
+    and contact slope are requested; these two need finer grids than drag and depth.
     """
 
     accuracy: float = 0.01
@@ -80,9 +80,9 @@ def solve(
 ) -> tuple[Steady, FloatArray]:
     """Return the steady states of a solid that slides over a line, and their errors, shape (4, cases).
 
-    Positions on the line are in units of its length. A Kelvin solid has no `terms`. The Deborah number is eta v /
-    (G_inf L) of the dashpot; for a Kelvin solid this is v tau / L. The load is F_N / (4 G_inf L), in the unit of
-    height.
+    Positions on the line are in units of its length. A Kelvin solid has no `terms`. The Deborah number is that of the
+    dashpot, eta v / (G_inf L); for a Kelvin solid it is equal to v tau / L. The load is F_N / (4 G_inf L), in the unit
+    of height.
 
     The errors are the absolute discretisation errors of `Steady.columns`, infinite if they are not estimated. A case
     that misses the accuracy on the finest grid is returned with its errors.
@@ -158,7 +158,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
     """Store the results of cases that have no results yet.
 
-    Older results are replaced if the new results meet the accuracy, or if their error of the drag is smaller.
+    Older results are replaced if the new results meet the accuracy, or if the new error of the drag is smaller.
     """
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])

@@ -38,7 +38,8 @@ LOST = 1e-13  # rounding errors dominate if the rise in `_is_lost` is below this
 # A trail describes the depth as a function of the load near the last sweep. Its five entries are: log depth, log load,
 # slope d(log depth) / d(log load), derivative of this slope with respect to the log load, and Deborah number.
 TRAIL = 5
-LATTICE_BITS = 20  # a lattice depth is a depth with this number of binary digits: only such depths are tried
+# a lattice depth is a depth with this number of significant binary digits; only such depths are tried
+LATTICE_BITS = 20
 
 
 @jit
@@ -65,8 +66,8 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
     """Update a `trail` (see `TRAIL`) after a sweep at a depth.
 
-    The derivative of the slope follows from the last two sweeps. It hardly depends on the Deborah number, and is not
-    changed if the Deborah number is new.
+    The derivative of the slope follows from the last two sweeps. This derivative hardly depends on the Deborah number;
+    it is kept if the last two sweeps had different Deborah numbers.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -102,8 +103,8 @@ def _solve(
     The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent reaches
     `load` is an upper bound of the solution, and so is the depth at which full contact carries the load. The search
     ends at a lattice depth that carries at most `load` if the tangent reaches `load` before the next lattice depth. The
-    result does not depend on the guess in `trail`, because only one lattice depth is the largest. `sums` receives the
-    sums at this depth.
+    result does not depend on the guess in `trail`, because there is only one largest lattice depth that carries at most
+    `load`. `sums` receives the sums at this depth.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf

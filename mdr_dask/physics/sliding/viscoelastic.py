@@ -2,7 +2,7 @@
 
 The stretch of Prony term m is e_m = u - a_m, where u is the displacement of the element and a_m the displacement of the
 dashpot of the term. Newton's method finds the depth. On a periodic line it also finds the stretches at the start of the
-line, which must repeat after one period.
+line: after one period, each stretch must have the same value again.
 """
 
 from __future__ import annotations
@@ -114,9 +114,10 @@ class ViscoelasticCase:
         self._before: FloatArray | None = None  # results on the previous grid
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
-        """Solve the case on the next finer grid; all results except the first are extrapolated from the last two grids.
+        """Solve the case on the next finer grid.
 
-        A periodic line begins and ends at its highest node, which must be a node of every grid.
+        From the second grid on, the results are extrapolated from the last two grids. A periodic line begins and ends
+        at its highest node, which must be a node of every grid.
         """
         cells = height.size - 1
         summit = float(np.max(height))
@@ -133,7 +134,8 @@ class ViscoelasticCase:
         result = values.copy()
         if self._before is not None:
             change = values - self._before
-            extrapolated = np.abs(change) <= np.abs(values)  # a larger change might reverse the sign of the result
+            # with a larger change, the extrapolation might reverse the sign of the result
+            extrapolated = np.abs(change) <= np.abs(values)
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
         self._before = values
@@ -144,8 +146,8 @@ class ViscoelasticCase:
     ) -> tuple[Outcome, FloatArray, FloatArray]:
         """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The computed depth is the penetration of the highest node. The search starts from the state `start` on the
-        previous grid, or from the static contact.
+        The computed depth is the penetration of the highest node. The search starts from the state `start`, which was
+        found on the previous grid. Without a suitable `start`, it starts from the contact at rest.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -177,7 +179,7 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
         moduli = np.append(viscosity / cell / shortest, moduli)
         deborah = np.append(shortest, deborah)
     times, distance = recovery_times(moduli * deborah, deborah)
-    stretch = deborah[:, None] / distance  # of every term (row) in every mode (column) of strain 1
+    stretch = deborah[:, None] / distance  # row m, column k: stretch of Prony term m in recovery mode k of strain 1
     # the modes are orthogonal with the weights moduli / deborah, so that the inverse of `stretch` has a closed form
     norm = np.sum((moduli * deborah)[:, None] / distance**2, axis=0)
     return Travelling(moduli, deborah, times, stretch.T.copy(), moduli[:, None] / distance / norm)
@@ -186,8 +188,9 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
 class Swept(NamedTuple):
     """The solid, and the alternating free recoveries and contacts (pieces) of a sweep.
 
-    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). The decay lengths belong to the recovery modes
-    in a free recovery, and to the Prony terms in a contact. The lengths are those of `Passage`.
+    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). For a free recovery, these are the decay
+    lengths of the recovery modes; for a contact, those of the Prony terms. `lengths` contains the lengths of the
+    pieces, as in `Passage`.
     """
 
     decayed: FloatArray
@@ -200,9 +203,9 @@ def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatAr
     """Multiply the matrix of derivatives of a Newton step by given changes of the unknowns.
 
     The entries of `direction` are changes of the stretches e_m at the start of the line, and of the depth. `product`
-    receives the changes of the integrals of e_m, and of u. The places where contact begins and ends are kept fixed,
-    because u is continuous there and their shift is of second order. If the line is not periodic, the recovery behind
-    the line is included. `workspace`, shape (3, terms), is overwritten.
+    receives the changes of the integrals of all e_m, and of the integral of u. The places where contact begins and ends
+    are kept fixed, because u is continuous there and their shift is of second order. If the line is not periodic, the
+    recovery behind the line is included. `workspace`, shape (3, terms), is overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -250,10 +253,11 @@ def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> Floa
 def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace: FloatArray, step: FloatArray) -> None:
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
-    `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u, and `scale` the
-    magnitudes of their derivatives. With every row divided by its scale, the matrix is the identity plus an operator
-    whose entries are smooth functions of the relaxation times. Its singular values decrease fast, so that four to seven
-    products of the matrix and a vector are enough for any number of terms.
+    `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u. `scale` contains
+    the magnitudes of the derivatives of these integrals. With every row divided by its scale, the matrix is the
+    identity plus an operator whose entries are smooth functions of the relaxation times. The singular values of this
+    operator decrease fast, so that four to seven products of the matrix and a vector are enough for any number of
+    terms.
     """
     n = residual.size
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -323,13 +327,14 @@ def solve_sliding(
     """Find the depth at a given load, and on a periodic line also the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u: `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing function of the
-    unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
+    integral of u. This integral is `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing
+    function of the unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
 
     Heights are relative to the highest node, which is the first and the last node of a periodic line. On any other
     line, elements enter undeformed and recover behind the end of the line, so that the depth is the only unknown.
-    `unknown` contains the stretches e_m at the first node, then the depth: first guesses, replaced by the solution.
-    `totals` is that of `Passage`. Return an `Outcome`; a line that is not periodic must not end in contact.
+    `unknown` contains the stretches e_m at the first node, then the depth; the first guesses are replaced by the
+    solution. `totals` receives the `totals` of the last `Passage`. Return an `Outcome`, which is `OUTSIDE_LINE` if a
+    line that is not periodic ends in contact.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     terms, nodes = moduli.size, profile.size
@@ -364,7 +369,8 @@ def solve_sliding(
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):
-            weight = min(1.0, moduli[j]) if j < terms else 1.0  # soft Prony terms hardly matter
+            # an error of the stretch of a soft Prony term hardly matters
+            weight = min(1.0, moduli[j]) if j < terms else 1.0
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]
         if not np.isfinite(largest):

@@ -1,8 +1,9 @@
 """Exact sweep of a linear viscoelastic foundation along a line of straight cells.
 
-Lengths are in cells, and stresses are divided by the static modulus. The stretch e_m of Prony term m obeys de_m/ds =
-du/ds - e_m / deborah_m, with deborah_m = tau_m v in cells and the travelled distance s. In contact, u is the
-penetration w, and the stretches have closed forms. A free element recovers as a sum of exponential modes.
+The unit of length is the cell width, and stresses are divided by the static modulus. The stretch e_m of Prony term m
+obeys de_m/ds = du/ds - e_m / deborah_m, where s is the travelled distance and deborah_m the distance tau_m v. In
+contact, u is the penetration w, and the stretches have closed forms. A free element recovers as a sum of exponential
+modes.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ CLOSED, OPEN_END = 0, 1
 
 
 class Travelling(NamedTuple):
-    """A sliding solid and its recovery modes; stresses are divided by the static modulus, lengths by that of a cell.
+    """A sliding solid and its recovery modes.
 
-    The Prony terms are in ascending order of the Deborah number tau_m v / dx. `times` are the decay lengths of the
-    recovery modes. Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k alone has the
-    strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m alone has the stretch
-    1.
+    Stresses are divided by the static modulus, and lengths by the cell width. The Prony terms are in ascending order of
+    the Deborah number tau_m v / dx. `times` are the decay lengths of the recovery modes. Row k of `stretch_of` contains
+    the stretches of all Prony terms if recovery mode k alone has the strain 1. Row m of `amplitude_of` contains the
+    strains of all recovery modes if Prony term m alone has the stretch 1.
     """
 
     moduli: FloatArray
@@ -47,8 +48,8 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray) -> None:
     """Write the factors `decay`, `gain` and `area` of every Prony term over a straight piece of the given length.
 
-    From the stretch e at the start of the piece follow the stretch decay * e + gain * slope at its end, and the
-    integral of the stretch gain * e + area * slope.
+    If e is the stretch at the start of the piece, the stretch at its end is decay * e + gain * slope, and the integral
+    of the stretch over the piece is gain * e + area * slope.
     """
     for m in range(deborah.size):
         x = length / deborah[m]
@@ -140,10 +141,10 @@ def _next_contact(
 ) -> float:
     """Return the position where an element that is free from `place` on meets the line again, or -1.
 
-    The search begins in the cell that ends at `node`. After contact has ended inside a cell this must be the next cell,
-    because the strain is convex and does not meet the same straight cell again. The logarithm of a sum of decaying
-    exponentials is convex as well, so that a tangent exponential is a lower bound of the strain. Nodes below this bound
-    are skipped.
+    The search begins in the cell that ends at `node`. If contact ended inside a cell, the search must begin in the next
+    cell, because the strain of the element is convex and does not meet the same straight cell again. The logarithm of a
+    sum of decaying exponentials is convex as well, so that a tangent exponential is a lower bound of the strain. Nodes
+    below this bound are skipped.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -167,10 +168,11 @@ def _next_contact(
 class Passage(NamedTuple):
     """The results of a sweep.
 
-    `lengths`, with at least 2 nodes + 2 entries, are the alternating lengths of free recoveries and contacts; the first
-    is that of a free recovery and may be 0. `imbalance` contains the integral of each e_m over the line. The six
-    entries of `totals` are: integral of u; integral of the stress; integral of the stress times the slope; length in
-    contact; integral of slope^2 over the length in contact; integral of u behind the end of the line.
+    `lengths` contains the lengths of free recoveries and contacts, which alternate; the first length is that of a free
+    recovery and may be 0. For n nodes, the array needs at least 2 n + 2 entries. `imbalance` contains the integral of
+    each e_m over the line. The six entries of `totals` are: integral of u; integral of the stress; integral of the
+    stress times the slope; length in contact; integral of slope^2 over the length in contact; integral of u behind the
+    end of the line.
     """
 
     lengths: FloatArray
@@ -247,9 +249,9 @@ def _contact(
 ) -> tuple[float, float, float, bool]:
     """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
 
-    Return the place, strain and remaining stress there, and True if the contact ends, False if the line ends. The
-    stretches are written to ``workspace[0]``. The node at which the search for the next contact begins is
-    ``workspace[2, 0]``.
+    Return the place where this happens, strain and remaining stress at this place, and whether the contact ends there
+    (False: the line ends first). The stretches are written to ``workspace[0]``. The node at which the search for the
+    next contact begins is ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]

@@ -1,9 +1,10 @@
 """Velocity jumps solved to a requested accuracy, with estimated errors.
 
-The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The transient is the difference between a march on one grid and the steady state on
-the same grid, added to the accurate steady state. It is therefore accurate even if it is much smaller than the
-friction. Its error is estimated by a second march on half as many nodes with half as many steps.
+The steady states before and after a jump, and the drag just after the jump, are solved on finer and finer grids
+(:mod:`mdr_dask.physics.refine`). The march is computed on one grid only. The steady state on the same grid is
+subtracted from it, and the difference is added to the accurate steady state. The transient is therefore accurate even
+if it is much smaller than the friction. The error of the transient is estimated by a second march with half as many
+nodes and half as many steps.
 """
 
 from __future__ import annotations
@@ -76,10 +77,11 @@ def solve_jumps(
     """Return the velocity jumps on a line.
 
     Loads are F_N / (4 G L h), where h is the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2
-    tau / L. The accuracy is relative; for depths below h it is relative to h. Without an accuracy, the steady states
-    are solved on the grid of the march only, and no errors can be requested. `oversampling` is the number of nodes per
-    Nyquist point in the march, an even number; the steady states use at least as many. Without a `march`, the transient
-    is not computed. `with_errors` states whether the error of the transient is estimated.
+    tau / L. `accuracy` is the allowed relative error; the error of a depth below h is relative to h. If `accuracy` is
+    None, the steady states are solved on the grid of the march only, and no errors can be requested. `oversampling` is
+    the number of nodes per Nyquist point in the march, an even number; the steady states use at least as many. If
+    `march` is None, the transient is not computed. `with_errors` states whether the error of the transient is
+    estimated.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -126,7 +128,7 @@ def solve_jumps(
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth of a jump that was not marched: the neglected changes."""
+    """Return the errors of drag and depth of a jump that was not marched; they are equal to the neglected changes."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -134,7 +136,7 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and of depth between two paths, from each given time to the end.
+    """Return the largest differences of drag and depth between two paths after each of the given times.
 
     The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. If there
     is no path on the coarse grid, the differences are infinite.

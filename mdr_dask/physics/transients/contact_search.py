@@ -1,14 +1,15 @@
 """Find the contact patches at one instant after a velocity jump.
 
 The search visits the cells of the line in the direction in which the elements move, from the highest point on. The
-force on an element in contact is lift + h + D h'. Here h is the height of the line, D is the Deborah number v tau in
-cells, and the lift is the sum of the depth and the rate of the depth. Contact ends where the force falls through zero,
-or where free elements arrive with a displacement larger than the depth plus the height of the line. Contact begins
-where the line rises above the free elements and the force would be positive. Most cells are skipped because of bounds
-(`_skip_pressed`, `_skip_free`); the bounds are rigorous, so that no contact is missed.
+force on an element in contact is lift + h + D h'. Here h is the height of the line, the Deborah number D is the
+distance v tau in cells, and the lift is the sum of the depth and the rate of the depth. Contact ends where the force
+falls through zero, or where free elements arrive with a displacement larger than the depth plus the height of the line.
+Contact begins where the line rises above the free elements and the force would be positive. Most cells are skipped
+because of bounds (`_skip_pressed`, `_skip_free`); the bounds are rigorous, so that no contact is missed.
 
 Free elements may pass the highest point without contact, and travel more than a whole period of the line. If there may
-be such elements, the search is repeated with the places of separation of the previous period.
+be such elements, the search is repeated; this time it includes the elements that separated from the line in the
+previous period.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ class Reachable(NamedTuple):
 
 
 class SkipBounds(NamedTuple):
-    """For each cell out of contact, the approach (see `_skip_free`) up to which the cell can be skipped.
+    """For each cell out of contact: the cell can be skipped until the approach (see `_skip_free`) reaches `skip_until`.
 
     The entries of `state` are: approach so far, the largest entry of `skip_until`, and time, depth and largest drift at
     the last search.
@@ -124,11 +125,12 @@ def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Worksp
 
 
 class Motion(NamedTuple):
-    """Changes of the depth up to an instant.
+    """Changes of the depth and of the lift from the jump until now.
 
-    `rise` is the largest mean rate of the lift from an earlier moment until now, and `fall` the largest rate at which
-    the lift has fallen from one moment to the next. `deepest` is the largest depth and `highest` the largest lift so
-    far. `passes_top` is True if free elements may have passed the highest point of the line without contact.
+    `rise` is the largest mean rate at which the lift has increased from any earlier instant until now. `fall` is the
+    largest rate at which the lift has decreased from one time step to the next. `deepest` is the largest depth and
+    `highest` the largest lift so far. `passes_top` is True if free elements may have passed the highest point of the
+    line without contact.
     """
 
     rise: float
@@ -153,8 +155,9 @@ class Cell(NamedTuple):
     """Cell i of the line, with the coefficients of the cubic that is the height of the line.
 
     `stop` is the end of the cell, or of the period if the period ends in this cell. `pressed` is True if the force on
-    elements in contact would be positive everywhere in the cell; `weak`, if it may have been negative at an earlier
-    moment; `separated`, if elements may have separated in the cell although the force is positive now.
+    elements in contact would be positive everywhere in the cell; `weak` is True if this force may have been negative at
+    an earlier instant. `separated` is True if elements may have separated in the cell although the force is positive
+    now.
     """
 
     i: int
@@ -167,7 +170,7 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at the last moment of the history; return their number, or `FULL`.
+    """Find the contact patches at the last instant of the history; return their number, or `FULL`.
 
     The runs must contain all patches at this depth. The patches and their `sums` are written to the workspace. The sums
     are: load and drag, divided by 4 G dx; length in contact; integral of the slope over the length in contact;
@@ -199,7 +202,10 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
 
 @jit_inline_uncounted
 def _motion_until(now: Instant, second: float) -> Motion:
-    """Return the changes of the depth; `second` is the largest height outside the patch of the highest point."""
+    """Return the `Motion` until now.
+
+    The argument `second` is the largest height outside the patch that contains the highest point.
+    """
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
     lift, rise, fall, passes_top = depth + rate, 0.0, 0.0, False
@@ -225,9 +231,10 @@ def _motion_until(now: Instant, second: float) -> Motion:
 
 @jit_inline_uncounted
 def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
-    """Add the approach of the line to free elements since the last search.
+    """Increase the approach (see `_skip_free`) by its largest possible change since the last search.
 
-    If the last search was neither at this instant nor at the previous instant of the history, no cell remains skipped.
+    If the last search was neither at this instant nor at the previous instant of the history, no cell is skipped any
+    longer.
     """
     history, last = now.history, now.history.count - 1
     depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
@@ -246,8 +253,8 @@ def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
 def _search_period(search: Search, runs: IntArray) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
-    Places of separation that the workspace already contains belong to the previous period. If there are none, the
-    highest point is assumed to be in contact.
+    The places of separation that are stored in the workspace at the start belong to the previous period. If there are
+    none, the highest point is assumed to be in contact.
     """
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
@@ -282,17 +289,21 @@ def _search_period(search: Search, runs: IntArray) -> int:
 
 @jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first place at which elements now further along the line can have separated, or `otherwise`."""
+    """Return the first place where elements that are now further along the line may have separated.
+
+    If no such place is stored, return `otherwise`.
+    """
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 
 @jit_inline_uncounted
 def _skip_pressed(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from cell i on in which contact may end or elements may have separated.
+    """Search from cell i on, and return the first cell in which contact may end or elements may have separated.
 
-    A cell is skipped if the elements that are now further along the line passed it under a positive force, and if u of
-    free elements cannot exceed w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w
-    wherever w + D h' exceeds the largest drift (see `free_recovery`).
+    A cell is skipped under two conditions: the force was positive on all elements that passed the cell and are now
+    further along the line, and the displacement u of free elements cannot exceed w = depth + h in the cell. Along the
+    line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the largest drift (see
+    `free_recovery`).
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     bounds, begin = work.recovery.bounds, scan[BEGIN]
@@ -313,13 +324,13 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _skip_free(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from cell i on in which contact may begin.
+    """Search from cell i on, and return the first cell in which contact may begin.
 
     The displacement of free elements has a lower bound, computed along the line from the last known displacement and
-    the least drift. The *gap* is this bound minus the largest depth + h in the cell. If the gap is wider than any gap
-    that can have opened since the elements separated, there was a gap all the time, and the cell is skipped until the
-    line has approached by the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral
-    of this rate over time is the *approach*.
+    the least drift. The *gap* is this bound minus the largest depth + h in the cell. If the gap is too wide to have
+    opened since the elements separated, there was a gap all the time; the cell is then skipped until the line has
+    approached the elements by the width of the gap. The gap closes at most at the rate of the depth plus the largest
+    drift. The *approach* is the integral of this largest rate over time.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, skip, lift = now.track, work.recovery.bounds, work.skip, search.lift
@@ -340,9 +351,10 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
-    """Skip a cell until the line has approached by the given gap, if there was a gap all the time; return if so.
+    """Return whether the elements in a cell certainly had a gap to the line all the time, so that they stay free.
 
-    `oldest` is the place where the free elements in the cell can have separated at the earliest.
+    Such a cell is skipped until the line has approached the elements by the given gap. The free elements in the cell
+    separated at the place `oldest` or further along the line.
     """
     skip, opened = search.work.skip, search.work.recovery.bounds.opened
     if not (gap > 0 and gap > opened[window(2 * (cell + 1 - oldest) + MARGIN)]):
@@ -465,11 +477,11 @@ def _lowest_behind(search: Search, u: float) -> float:
 
 @jit_inline_uncounted
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
-    """Return whether contact begins in a cell from x on, and where it begins (or else where the search continues).
+    """Return whether contact begins beyond x in a cell, and the place where it begins.
 
-    Contact can begin only between `low`, where the force becomes positive, and `high`, where it falls to zero again.
-    Elements may have separated near `high` earlier, even if there is no contact now. If `ended` is True, contact or a
-    positive force has just ended at x.
+    If it does not begin, return instead the place where the search continues. Contact can begin only between `low`,
+    where the force becomes positive, and `high`, where it falls to zero again. Elements may have separated near `high`
+    earlier, even if there is no contact now. If `ended` is True, contact or a positive force has just ended at x.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
@@ -508,8 +520,8 @@ def _add_edge(search: Search, place: float, steep: float, by_depth: float, openi
     """Add the changes of load and drag that are caused by the motion of one edge of a patch.
 
     The force at this edge is not zero. The edge moves if the depth or the time changes. The gap is the height of the
-    line above the free elements: `steep` is its slope towards the inside of the patch, `by_depth` its derivative with
-    respect to the depth, and `opening` its rate.
+    line above the free elements. `steep` is the slope of the gap towards the inside of the patch, `by_depth` the
+    derivative of the gap with respect to the depth, and `opening` its derivative with respect to time.
     """
     sums = search.work.sums
     h, slope, _ = height_at(search.now.track, place)
@@ -543,7 +555,7 @@ def _add_separation(search: Search, place: float) -> None:
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add a cell in which elements can have separated although the force is positive now."""
+    """Add a cell in which elements may have separated earlier although the force is positive now."""
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1
@@ -564,9 +576,9 @@ def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, f
 
 @jit_inline_uncounted
 def _may_have_separated(search: Search, i: int) -> bool:
-    """Return whether elements can have separated in cell i or just before it, although the force is positive now.
+    """Return whether elements may have separated in cell i or just before it, although the force is positive now.
 
-    The force on such an element has fallen through zero and has risen again while the element travelled.
+    The force on such an element fell through zero and became positive again while the element travelled.
     """
     track, motion, deborah = search.now.track, search.motion, search.now.deborah
     start, middle, end = _force_slopes(track, deborah, i)

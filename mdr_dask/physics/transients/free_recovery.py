@@ -1,8 +1,8 @@
 """The displacement of elements that recover freely after a velocity jump.
 
-An element that is now at x was at x' = x - D (t - t') at the time t', with the Deborah number D = v tau in cells. Its
-displacement is the largest of the displacements that the line imposed on it earlier, each reduced by the decay since
-then:
+An element that is now at x was at x' = x - D (t - t') at the time t', where the Deborah number D is the distance v tau
+in cells. The displacement of the element is the largest of the displacements that the line imposed on it earlier, each
+reduced by the decay since then:
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
@@ -33,7 +33,7 @@ STRIDE = 2.0  # longest step towards a place of separation, in cells
 MET = 1e-3
 CREST = 1e-3  # accuracy, in cells, of the place where the gap between line and free elements is smallest
 FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
-MARGIN = 64.0  # number of cells added to twice a distance, so that the window of a bound is long enough
+MARGIN = 64.0  # number of cells that is added to twice a distance to find a window which is certainly long enough
 # cells travelled in the shortest window; number of windows, each twice as long as the previous one
 WINDOW, WINDOWS = 8.0, 16
 
@@ -70,12 +70,12 @@ class PathBounds(NamedTuple):
 
 
 class FreeRecovery(NamedTuple):
-    """Places or stretches of the line where elements can have separated, in order along the line.
+    """Places or stretches of the line where elements may have separated, in order along the line.
 
-    An entry is a place of separation if ``earliest == place``: there, the force on elements in contact falls to zero
-    now, and since the jump this happened between `place` and `farthest`. All other entries are stretches: the force is
-    positive now, but elements can have separated in the cells from `earliest` to `place`, at times when the lift was
-    below `barrier`.
+    An entry is a place of separation if ``earliest == place``: the force on elements in contact is zero there now, and
+    at earlier instants since the jump it was zero somewhere between `place` and `farthest`. All other entries are
+    stretches: the force is positive now, but elements may have separated in the cells from `earliest` to `place`, at
+    times when the lift was below `barrier`.
     """
 
     earliest: FloatArray
@@ -171,8 +171,8 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
     """Return displacement, slope and du/d(depth) of an element at x that separated near a place.
 
     The place of separation is between `place`, where the force vanishes now, and `farthest`, the farthest place where
-    the force has vanished since the jump. The displacement is stationary there, so that few Newton steps are enough. It
-    is -1 if the element did not separate between `place` and `farthest`.
+    the force has vanished since the jump. The displacement is stationary there, so that few Newton steps are enough.
+    The returned displacement is -1 if the element did not separate between `place` and `farthest`.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -254,7 +254,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
 
 @jit_inline_uncounted
 def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float]:
-    """Return the displacement u of free elements at x, the slope du/dx, and the derivative of u by the depth."""
+    """Return the displacement u of free elements at x, and the derivatives of u with respect to x and to the depth."""
     u, slope, by_depth = 0.0, 0.0, 0.0
     for k in range(recovery.count[0]):
         value, value_slope, value_by_depth = _from_separation(now, recovery, k, x)
@@ -271,8 +271,9 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
     """Return the gap at x, and its slope, curvature, derivative with respect to the depth, and rate.
 
-    The gap is the height of the line above free elements. The displacement of free elements at x changes at the rate -u
-    - D u'. For the curvature it is approximated by an exponential function along the line.
+    The gap is the height of the line above free elements. At a fixed place x, the displacement of free elements changes
+    at the rate -u - D u'. For the curvature of the gap, this displacement is approximated by an exponential function
+    along the line.
     """
     u, u_slope, by_depth = displacement_at(now, recovery, x)
     last = now.history.count - 1
@@ -286,9 +287,10 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
-    """Return where the line rises above free elements, and slope, derivative by the depth and rate of the gap there.
+    """Return the place where the line rises above free elements, and three derivatives of the gap at this place.
 
-    The first guess x is between `low` and `high`.
+    The derivatives are those with respect to the place, to the depth and to time. The first guess x is between `low`
+    and `high`.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
     for _ in range(ITERATIONS):
@@ -328,7 +330,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove places of separation from which no element can have a displacement above `pressed` at x any more.
+    """Remove each place of separation whose elements cannot have a displacement above `pressed` at x any more.
 
     `deepest` is the largest depth since the jump.
     """

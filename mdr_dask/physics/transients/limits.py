@@ -51,7 +51,7 @@ class PreparedLine(NamedTuple):
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers for a Deborah number v tau in cells."""
+        """Return the barriers for a Deborah number, which is the distance v tau in cells."""
         if deborah not in self.known:
             if len(self.known) >= KEPT:
                 self.known.clear()
@@ -67,13 +67,14 @@ class PreparedLine(NamedTuple):
 
 
 class SteadyLimits(NamedTuple):
-    """Steady states before and after a jump, and the instant of the jump.
+    """Steady states before and after a jump, and the state just after the jump.
 
     `before`, `at` and `after` are the drags F_x / (4 G L) in steady sliding at v_1, just after the jump, and in steady
     sliding at v_2, in the unit of height squared divided by the unit of length. Just after the jump, `rate` is the
     derivative of the depth with respect to t / tau, and `tilt` that of the drag with respect to `rate`. `depth` and
-    `contact` (fraction of the line) are pairs of steady values. `first` is the contact before the jump, and `slower`
-    that in steady sliding at the lower of both velocities; both are None if a steady state was not found.
+    `contact` (fraction of the line) are pairs of steady values. `first` contains the contact patches before the jump,
+    and `slower` the patches in steady sliding at the lower of the two velocities; both are None if one of the two
+    steady states was not found.
     """
 
     before: float

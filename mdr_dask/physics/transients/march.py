@@ -25,7 +25,7 @@ from mdr_dask.physics.transients.patches import (
     Track,
 )
 
-TRIALS = 80  # largest number of Newton steps for the depth at one moment
+TRIALS = 80  # largest number of Newton steps for the depth at one instant
 ORDER = 3  # order of the backward differentiation
 EXACT = 1e-11  # relative error of the load below which no Newton step is needed
 NEWTON_LOAD = 0.03  # largest relative error of the load before the last Newton step
@@ -52,7 +52,7 @@ class Stepping(NamedTuple):
 class Finish(NamedTuple):
     """Criterion for the end of a march: final depth and drag, and the allowed distances from these values.
 
-    `drag_distance` is relative to the largest distance from the final drag during the march.
+    `drag_distance` is a fraction of the largest difference from the final drag during the march.
     """
 
     depth: float
@@ -80,7 +80,7 @@ class Marching(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every moment, from just after the jump on.
+    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every instant, from just after the jump on.
 
     Rates are derivatives with respect to t / tau.
     """
@@ -111,7 +111,7 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], close: float, work: Workspace
 ) -> tuple[int, float, float]:
-    """Find the depth at which the load is carried, at the last moment of the history, by Newton's method.
+    """Find the depth at which the load is carried, at the last instant of the history, by Newton's method.
 
     Return the outcome (or `LEFT_LIMITS`), the drag, and its derivative with respect to t / tau.
     """
@@ -149,10 +149,10 @@ def _balance(
 
 @jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
-    """Return a and b: at moment `now` of a march the rate of the depth d is a d + b.
+    """Return the numbers a and b: if d is the depth at instant `now` of a march, the rate of the depth is a d + b.
 
-    They follow from backward differentiation with respect to log(1 + t / onset), because the relaxation is a smooth
-    function of this variable. In the first step, they follow from the known rate just after the jump.
+    The numbers follow from backward differentiation with respect to log(1 + t / onset), because the relaxation is a
+    smooth function of this variable. In the first step, they follow from the known rate just after the jump.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:
@@ -172,7 +172,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
 
 @jit_uncounted
 def _extrapolated(found: Trajectory, now: int) -> float:
-    """Extrapolate the depth to moment `now` by a parabola in log(1 + t / onset), or in t for the first moments."""
+    """Extrapolate the depth to instant `now` by a parabola in log(1 + t / onset), or in t for the first instants."""
     time, place, depth, rate, _, _ = found
     taken = time[now] - time[now - 1]
     if now == 1:
@@ -191,8 +191,8 @@ def march_depth(
 ) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
-    Only the first moment of `found` is given; the others are written. Return the number of moments, and an `Outcome` or
-    `LEFT_LIMITS`.
+    `found` contains the first instant; all later instants are written. Return the number of instants, and an `Outcome`
+    or `LEFT_LIMITS`.
     """
     time, place, depth, rate, drag, drag_rate = found
     near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - finish.drag)

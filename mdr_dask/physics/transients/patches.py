@@ -1,8 +1,8 @@
 """Contact patches on a line, and the forces on them.
 
 The unit of length is a cell of the line, and slopes are rises per cell. Times are in relaxation times. The Deborah
-number D is v tau in cells. The lift is the sum of the depth and its rate, so that the force on an element in contact,
-divided by 4 G dx, is lift + h + D h'.
+number D is the distance v tau in cells. The lift is the sum of the depth and its rate, so that the force on an element
+in contact, divided by 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -62,7 +62,10 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """Depth and its rate at ``count`` moments; ``stiff`` is the derivative of the last rate by the last depth."""
+    """Depth and its rate at ``count`` instants.
+
+    The derivative of the last rate with respect to the last depth is ``stiff``.
+    """
 
     time: FloatArray
     depth: FloatArray
@@ -147,14 +150,20 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
 
 @jit_inline_uncounted
 def unloading(line: Cubic, lift: float, deborah: float, y: float) -> float:
-    """Return the first place in a cell from y on where the force lift + h + deborah h' falls through 0, or `NONE`."""
+    """Search a cell from y on, and return the first place where the force falls through 0, or `NONE`.
+
+    The force is lift + h + deborah h'.
+    """
     c0, c1, c2, c3 = line
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
 @jit_inline_uncounted
 def loading(line: Cubic, lift: float, deborah: float, y: float) -> float:
-    """Return the first place in a cell from y on where the force rises through 0, or `NONE`."""
+    """Search a cell from y on, and return the first place where the force rises through 0, or `NONE`.
+
+    The force is lift + h + deborah h'.
+    """
     c0, c1, c2, c3 = line
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
@@ -181,8 +190,8 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
 
     Displacements and depth do not change at the jump; contact continues only where the force is positive at the new
     velocity and rate. `deborah` and `barriers` are those after the jump. `sums` receives load and drag, divided by 4 G
-    dx, length in contact (also the derivative of the load with respect to the rate), and integral of the slope over
-    this length.
+    dx, the length in contact, and the integral of the slope over this length. The length in contact is also the
+    derivative of the load with respect to the rate.
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)

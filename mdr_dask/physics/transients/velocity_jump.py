@@ -20,8 +20,8 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-# time after which the steps grow in a constant ratio, divided by the time in which the line travels 1 / q_max, where
-# q_max is the largest wavenumber
+# The steps grow in a constant ratio after ONSET times the time in which the line travels 1 / q_max, where q_max is the
+# largest wavenumber.
 ONSET = 0.5
 ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
 # NEWTON and SETTLED are divided by the number of steps per decade
@@ -38,7 +38,7 @@ LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
 # leaves the interval by more, the march is repeated with four times this margin. At most WIDENINGS attempts are made.
 MARGIN, WIDENINGS = 0.25, 3
 SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
-MOMENTS = 3000  # largest number of moments of a march
+MOMENTS = 3000  # largest number of instants of a march
 STEEPEST = 3.0  # largest ratio of a slope to the smaller slope of the adjacent secants; steeper cubics may overshoot
 
 
@@ -47,8 +47,8 @@ class MarchRequest(NamedTuple):
 
     `times` are increasing times after the jump, (t - t_0) / tau. `wavenumber` is the largest wavenumber of the line
     times its length, q_max L; it determines the first step. `per_decade` is the number of steps per factor of ten in
-    time. `accuracy` is the allowed error of the friction relative to the steady friction after the jump: a smaller
-    transient is not marched, and a march ends the earlier, the larger this error is. With ``accuracy = 0`` every
+    time. `accuracy` is the allowed error of the friction, divided by the steady friction after the jump. A transient
+    below this error is not marched, and a larger allowed error lets a march end earlier. With ``accuracy = 0`` every
     transient is marched.
     """
 
@@ -59,7 +59,7 @@ class MarchRequest(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Drag and depth at the moments of a march, and their rates, shape (2, moments) each.
+    """Drag and depth at the instants of a march, and their rates, shape (2, instants) each.
 
     Times are in relaxation times from the jump on. The first rate of the drag is unknown and is NaN. `falls` is True if
     the velocity falls.
@@ -73,9 +73,9 @@ class Path(NamedTuple):
     def at(self, times: FloatArray, after: FloatArray) -> FloatArray:
         """Return drag and depth at increasing times, shape (2, times).
 
-        Between moments both are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. If the
+        Between instants both are cubic in log(1 + t / t_1), where t_1 is the first instant after the jump. If the
         velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) behind every
-        patch. After the last moment drag and depth are equal to the steady values in `after`.
+        patch. After the last instant drag and depth are equal to the steady values in `after`.
         """
         power = 0.5 if self.falls else 1.0
         moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -168,7 +168,7 @@ class _Relaxation(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Change of the steady depth, to which errors of the depth are relative."""
+        """Change of the steady depth due to the jump; allowed errors of the depth are fractions of it."""
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
     @property
@@ -234,7 +234,7 @@ class _Relaxation(NamedTuple):
     def begun(self, interval: tuple[float, float]) -> tuple[Marching, Trajectory, Workspace]:
         """Return the constants, trajectory and workspace of a march whose depth stays in an interval.
 
-        Only the first moment of the trajectory is filled in.
+        Only the first instant of the trajectory is filled in.
         """
         line, limits, stepping = self.line, self.limits, self.stepping
         assert limits.first is not None

@@ -2,5 +2,5 @@
 
 The motion of every element is computed. Read `foundation` first: it describes a solid, and the motion of one element
 during one step. `steps` moves all elements and adds up the forces. `loading_history` describes velocity and load in
-time, and chooses the moments.
+time, and chooses the time steps.
 """

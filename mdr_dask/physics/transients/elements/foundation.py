@@ -21,10 +21,10 @@ class Foundation(NamedTuple):
     """A solid with the static modulus 1, and the modes in which its elements recover without force.
 
     `moduli` and `times` are G_m / G_inf and tau_m; `viscosity` is eta / G_inf, or 0 without a dashpot. `rates` are the
-    decay rates of the modes: one for each Prony term, and one more for a dashpot. The matrix `outward` transforms the
-    modes to the state of an element, and `inward` transforms back. The state consists of the strains a_m of the
-    dashpots of the Prony terms; with a dashpot of the solid, the displacement u precedes them. `push` contains the
-    rates at which the modes of the mean state grow under a unit load.
+    decay rates of the modes: one for each Prony term, and one more if there is a dashpot. The matrix `outward`
+    transforms the modes to the state of an element, and `inward` transforms back. The state consists of the strains a_m
+    of the dashpots of the Prony terms; if the solid itself has a dashpot, the displacement u is the first entry. `push`
+    contains, for each mode, the rate at which a load of 1 increases the mean of this mode over all elements.
     """
 
     moduli: FloatArray
@@ -57,10 +57,11 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
 
 
 class Lapse(NamedTuple):
-    """A duration, the decay during it, and work arrays for one element.
+    """A duration, the factors of decay during this time, and work arrays for one element.
 
     `decay` and `fades` are the factors by which the modes and the strains of the Prony terms decay; `part_decay` and
-    `part_fades` are those for a part of the duration. `modes` and `strains`, shape (1, terms), belong to one element.
+    `part_fades` are the factors for a part of the duration. `modes` and `strains`, shape (1, terms), belong to one
+    element.
     """
 
     time: float
@@ -211,7 +212,8 @@ def advance(
 
     The depth plus height of the line changes from w0 to w1; u0 and `touching` are displacement and contact at the
     start. `part` and `leaves` are results of :func:`release` for an element in contact. `after` is the displacement at
-    the end if the element separates then, or if it is free all the time.
+    the end if the element is then free: either it has separated as described by `part` and `leaves`, or it was free all
+    the time.
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades

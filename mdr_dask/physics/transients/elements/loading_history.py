@@ -34,7 +34,7 @@ LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at 
 
 
 class Response(NamedTuple):
-    """Forces and depth at every moment of a loading history, and the state of the elements at the end.
+    """Forces and depth at every instant of a loading history, and the state of the elements at the end.
 
     The drag is F_x / (4 G L), in the unit of height squared divided by the unit of length. `contact` is the fraction of
     the line in contact. Another history can continue from `state`.
@@ -96,7 +96,7 @@ def _halved(line: CubicLine) -> CubicLine:
 
 
 def _resting(line: CubicLine, state: State, depth: float) -> float:
-    """Write the state of all elements of a body in equilibrium at rest; return the load."""
+    """Write the state of all elements in equilibrium under a body at rest; return the load."""
     w = depth + line.height[:-1]
     state.displacement[:] = np.maximum(w, 0)
     state.terms[:] = state.displacement[:, None]
@@ -124,8 +124,8 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
 def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State) -> tuple[bool, float]:
     """Move one element along the line at constant depth until its state repeats, and write the state of all elements.
 
-    The number of nodes may be a multiple of the number of elements. Return whether the state repeats, and the
-    displacement at the end.
+    If the line has k times as many nodes as there are elements, every k-th node belongs to an element. Return whether
+    the state repeats, and the displacement at the end of the line.
     """
     n = line.height.size - 1
     every, step = n // state.displacement.size, 1 / (n * deborah)
@@ -169,8 +169,8 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
     During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
     The load alone determines the mean displacement; it does not matter which elements are in contact. Therefore the
     depth is the root of a convex function. If the line is not periodic, elements enter undeformed. Forces are
-    interpolated linearly between elements, which is most accurate for a line without kinks. `state` and `depth` belong
-    to the first moment; they are not changed.
+    interpolated linearly between elements, which is most accurate for a line without kinks. `state` and `depth`
+    describe the first instant; they are not overwritten.
     """
     now, out = deepcopy(state), np.full((3, schedule.moments.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
@@ -183,7 +183,7 @@ MOST_STEPS = 400_000  # largest number of steps in one piece of a history
 CELLS = 6.0  # largest travel in a step, cells
 PART = 0.12  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
 FIRST = 0.012  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
-NEARLY = 1e-2  # a moment is left out if its distance from a requested time is less than this fraction of a step
+NEARLY = 1e-2  # a time step is left out if its end differs from a requested time by less than this fraction of the step
 ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 
@@ -231,7 +231,7 @@ class Piece:
         return np.inf if same else self.end - self.start
 
     def moments(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
-        """Return the moments from the start of the piece to `end`, or None if there would be too many moments.
+        """Return the times of all steps from the start of the piece to `end`, or None if there would be too many steps.
 
         The steps begin small and grow in a constant ratio up to the longest step.
         """
@@ -258,10 +258,10 @@ class Trace(NamedTuple):
     """Friction during a history.
 
     The friction is the drag F_x / (4 G L) divided by the load F_N / (4 G_inf L), in the unit of height divided by the
-    unit of length. `before`, `at` and `after` are the friction in the steady state before t = 0, just after t = 0, and
-    in the final steady state, or NaN if the history does not end in steady forward sliding. At a jump, `friction` and
-    `depth` are the values just after the jump. `contact` is the largest fraction of the line in contact from t = 0 to
-    the last requested time.
+    unit of length. `before` is the friction in the steady state before t = 0, `at` the friction just after t = 0, and
+    `after` the friction in the final steady state. `after` is NaN if the history does not end in steady forward
+    sliding. At a jump, `friction` and `depth` are the values just after the jump. `contact` is the largest fraction of
+    the line in contact from t = 0 to the last requested time.
     """
 
     before: float
@@ -310,7 +310,7 @@ def trace(
         state, depth, travel = part.state, float(part.depth[-1]), float(travel + way[-1])
     moment, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
     at, after = float(friction[0]), _end(line, solid, pieces[-1])
-    last = np.searchsorted(moment, times, side="right") - 1  # at a jump, the moment just after the jump
+    last = np.searchsorted(moment, times, side="right") - 1  # at a jump, the instant just after the jump
     return Trace(first, at, after, friction[last], depths[last], float(contact.max()), Outcome.CONVERGED)
 
 
@@ -346,7 +346,7 @@ def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
 
 
 def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
-    """Return the moments and the requested times, without moments that are very near to a requested time."""
+    """Return the times of the steps and the requested times, without steps that end very near to a requested time."""
     inside = times[(times > moments[0]) & (times < moments[-1])]
     around = np.concatenate([[-np.inf], inside, [np.inf]])
     after = np.searchsorted(around, moments)

@@ -1,4 +1,4 @@
-"""Motion of all elements of a viscoelastic foundation through the moments of a loading history.
+"""Motion of all elements of a viscoelastic foundation in the time steps of a loading history.
 
 The static modulus and the length of the line are 1.
 """
@@ -29,9 +29,9 @@ from mdr_dask.physics.transients.elements.foundation import (
 class Edges(NamedTuple):
     """The last known edges of contact, at most one in the cell before each element.
 
-    The force is zero at such an edge, and one of the two elements of the cell is in contact. `place` is the distance of
-    the edge from this element, in cells, or -1 if there is no edge. `gap` is the gap of the other element at the moment
-    at which the edge was found.
+    The force is zero at such an edge, and one of the two elements of the cell is in contact. `place` is the distance
+    between the edge and the element in contact, in cells, or -1 if there is no edge. `gap` is the gap at the element
+    out of contact, at the instant at which the edge was found.
     """
 
     place: FloatArray
@@ -39,7 +39,7 @@ class Edges(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Deborah number and load at one moment.
+    """Deborah number and load at one instant.
 
     `first` is the first element of a line that is not periodic, or -1 on a periodic line.
     """
@@ -224,10 +224,10 @@ CORRECTIONS = 2  # number of corrections of the times of separation and of the d
 
 
 class State(NamedTuple):
-    """State of all elements at one moment: displacement u, strains of the dashpots of the Prony terms, and contact.
+    """State of all elements at one instant: displacement u, strains of the dashpots of the Prony terms, and contact.
 
-    `free` and `free_terms` are the displacement and the strains that an element in contact would have if its contact
-    had not begun. For a free element, `free` is its displacement, and `free_terms` is not used.
+    `free` and `free_terms` are the displacement and the strains that an element in contact would have if it had stayed
+    free. For a free element, `free` is its displacement, and `free_terms` is not used.
     """
 
     displacement: FloatArray
@@ -298,10 +298,10 @@ def _renew(state: State, old: int, new: int) -> None:
 
 
 class Schedule(NamedTuple):
-    """Travel, velocity and load at the moments of a loading history, shape (moments,) each.
+    """Travel, velocity and load at the instants of a loading history, shape (instants,) each.
 
     Velocity and load may jump at the first time. Travel and velocity are divided by L, and may be negative. Loads are
-    F_N / (4 G_inf L), positive, and linear between the moments.
+    F_N / (4 G_inf L), positive, and linear between the instants.
     """
 
     moments: FloatArray
@@ -426,9 +426,9 @@ def forces_now(
 ) -> tuple[float, float, float, float]:
     """Return the depth, the rate of the depth, the drag and the fraction of the line in contact.
 
-    The edges of contact are written to `state`. With a dashpot the rate of the depth is found at which the elements
-    carry the load. Without a dashpot the depth is corrected until the elements carry the load. The depth that follows
-    from the mean displacement is less accurate, because this mean is taken over the elements only.
+    The edges of contact are written to `state`. With a dashpot, the rate of the depth is changed until the elements
+    carry the load. Without a dashpot, the depth itself is changed until they do. The depth that follows from the mean
+    displacement is less accurate, because this mean is taken over the elements only.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
@@ -447,9 +447,9 @@ def forces_now(
 def follow_elements(
     solid: Foundation, line: CubicLine, schedule: Schedule, state: State, depth: float, out: FloatArray
 ) -> int:
-    """March all elements through the moments; return an `Outcome`.
+    """March all elements through the time steps; return an `Outcome`.
 
-    `out`, shape (3, moments), receives the drag, the depth, and the fraction of the line in contact.
+    `out`, shape (3, instants), receives the drag, the depth, and the fraction of the line in contact.
     """
     moments, travels, deborahs, loads = schedule
     workspace, modes = _workspace_for(solid, line.height.size - 1), np.empty(solid.rates.size)
