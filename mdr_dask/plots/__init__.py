@@ -24,14 +24,18 @@ GROUP = "mdr_dask.plots"
 
 
 def available(model: str) -> dict[str, Plot]:
-    """Return the figures for stores of a model, by name, including the figures that other packages offer in `GROUP`."""
+    """Return all figures for stores of a model, indexed by name. Figures from other packages (see `GROUP`) are
+    included.
+    """
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return the figures for the stores of a model, by name; for a model without own figures, one for each output."""
+    """Return all figures for stores of a model, indexed by name. If no figure was written for this model, each output
+    that varies with a parameter gets a figure.
+    """
     from mdr_dask.plots.view import figure_of, varied
 
     known = available(model)

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plot:
-    """A named figure of a store: `draw` makes it from the groups of the store, by the name of the series.
+    """A figure that has a name. Its function `draw` receives the groups of a store, indexed by the name of the series.
 
-    `models` is empty if the figure suits all models. `summary` names the quantities on both axes. `fitted` marks
-    figures that show a fit: in a large study, they take a long time.
+    `models` are the names of the models that have this figure; if it is empty, all models have it. `summary` names the
+    quantities on both axes. `fitted` is true if the figure shows a fit; such a figure takes a long time in a large
+    study.
     """
 
     name: str
@@ -66,7 +67,9 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return one text for each reason why results have no value, with the number of these results."""
+    """Return the numbers of results that failed, did not converge or are missing, as one text for each of these
+    reasons.
+    """
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
@@ -75,13 +78,15 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the origin of a figure that a command drew, for the table of the figure."""
+    """For the head of the table of a figure that a command drew, return the program version, the command and the
+    campaigns.
+    """
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 
 
 def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the origin of a figure that was drawn from Python, for the table of the figure."""
+    """For the head of the table of a figure drawn from Python, return the program version and the campaigns."""
     campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
     return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 

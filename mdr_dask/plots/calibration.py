@@ -26,8 +26,8 @@ Points = NDArray[np.intp]
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw measured points with the band of predictions, residuals, and the density of each unknown.
 
-    A density is grey if the data do not determine the unknown. Each product of unknowns that the data determine has a
-    panel.
+    The density of an unknown is grey if the data do not determine this unknown. If the data determine a product of
+    unknowns, the density of this product has a panel too.
     """
     found, series, data, left_out = _first(groups)
     varied = found.measured.conditions
@@ -51,7 +51,9 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset, list[str]]:
-    """Calibrate the first series that can be compared with its table; also return why other series are not drawn."""
+    """Calibrate the first series that can be compared with its table of measurements. The last value returned is a list
+    of texts that say why the other series are not drawn.
+    """
     reasons = {}
     for name, dataset in groups.items():
         try:
@@ -65,7 +67,9 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
-    """Return groups of points that differ only in the condition `main`, by label; one group if colours are too few."""
+    """Divide the measured points into curves: the points of a curve differ only in the condition `main`. The curves are
+    indexed by their labels. If there are more curves than colours, all points form one curve.
+    """
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
@@ -83,7 +87,9 @@ def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Po
 
 
 def _along(found: fit.Calibration, x: Axis, points: Points, data: xr.Dataset) -> FloatArray:
-    """Return the positions of points on the horizontal axis."""
+    """Return the positions of measured points on the horizontal axis; if the axis shows no condition, the numbers of
+    the points.
+    """
     if not x.quantity:
         return np.asarray(points, dtype=np.float64) + 1
     along: FloatArray = labels.quantity(x.quantity, data[x.quantity]).of(found.measured.conditions[x.quantity][points])

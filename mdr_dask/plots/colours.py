@@ -37,7 +37,9 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return line and marker of a curve. They differ if all colours are grey or the requested style defines them."""
+    """Return the line style and the marker of a curve. They are the same for all curves, unless all colours are grey or
+    the requested style defines line styles or markers.
+    """
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)
@@ -47,7 +49,7 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return the colour bar of some values; by default logarithmic if a logarithmic axis suits the values."""
+    """Return a colour bar for some values. By default, it is logarithmic if `is_geometric` is true for the values."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -56,7 +58,7 @@ def bar(label: str, values: Any, log: bool | None = None) -> Bar:
 
 
 def scale(of: Bar) -> tuple[Colormap, Normalize]:
-    """Return the colour map of a colour bar and its scale as a norm of matplotlib."""
+    """Return the colour map of a colour bar, and the matplotlib norm that maps values to this colour map."""
     from matplotlib import colormaps, rcParams
     from matplotlib.colors import LogNorm, Normalize
 

@@ -29,9 +29,10 @@ class Curve(NamedTuple):
 class Family(NamedTuple):
     """Curves against one parameter, with the entries of their legend.
 
-    `bar` is the colour bar, if there are more values than colours. `held` are the parameters fixed at one value.
-    `left_out` names the values that are not drawn. `varying` are the other parameters that change from point to point
-    in a sampled study.
+    `bar` is a colour bar if the curves have more values than there are colours, otherwise None. `held` are the
+    parameters that have one value in all curves. `left_out` are texts about the values that are not drawn. In a sampled
+    study, several parameters change from point to point; `varying` are those that neither the axis nor the colours
+    show.
     """
 
     curves: list[Curve]
@@ -64,7 +65,7 @@ def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
 
 
 def axes_of(data: xr.Dataset, output: str) -> list[str]:
-    """Return the dimensions of an output that are axes of the study, without the realisations."""
+    """Return the dimensions of an output that are axes of the study. The dimension ``realisation`` is not an axis."""
     if "status" in data:
         cases = {str(dim) for dim in data["status"].dims}
     else:
@@ -116,10 +117,11 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str = "", first: int = 0) -> Family:
     """Split a series into curves against the parameter `along`.
 
-    The curves differ in the parameter `by`. Without `by`, all curves are drawn if there are enough colours; otherwise
-    colours show one axis and line styles show a second axis with few values. All other axes are fixed at their middle
-    value. More numbers than colours get a colour bar; of more words than colours, some are left out. `series` precedes
-    the names of the curves, and `first` is the number of the first colour.
+    The curves differ in the parameter `by`. Without `by`, there is a curve for every combination of values of the other
+    axes. If there are too few colours for this, colours show the values of one axis, and line styles show those of a
+    second axis if it has few values. All axes that are not shown are fixed at their middle value. If an axis shown by
+    colours has more values than there are colours, numbers get a colour bar, and some words are left out. The label of
+    each curve begins with the name `series`. The first curve gets the colour with the number `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
@@ -160,7 +162,9 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Return the axis for colours, or the axes for colours and line styles, with which most curves are shown."""
+    """Choose the axis shown by colours, and possibly a second axis shown by line styles, so that as many curves as
+    possible are drawn.
+    """
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
     choices = [*([dim] for dim in others), *pairs]
@@ -197,7 +201,7 @@ def _split(
     curves = []
     for part, label, cell in zip(parts, named, cells, strict=True):
         k = cell[1] if second else 0
-        marker = "." if bar and joined else colours.MARKERS[k]  # many curves get a small marker
+        marker = "." if bar and joined else colours.MARKERS[k]  # small markers, because there are many curves
         curves.append(Curve(part, label, shades[cell[0]], colours.LINES[k] if joined else "", marker))
     keys = []
     if bar is None:
@@ -220,7 +224,9 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return one label for each of some axes, with the values of the parameters that vary along the axis."""
+    """Return one label for each of the dimensions `dims`: the values that its parameters have in this part of the
+    series.
+    """
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -231,7 +237,7 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have a single value and an effect."""
+    """Return the parameters of a series that have a single value, without those that have no effect in this series."""
     requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
     idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
@@ -254,7 +260,9 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 
 
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
-    """Return the fixed parameters for a title: first axes of the study, then parameters that have a symbol."""
+    """Return a text with the fixed parameters, for a title: first those that are axes of the study, then the others
+    that have a symbol.
+    """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
     names += [name for name in page.current().symbols if name in held and name not in names and _is_known(held[name])]
@@ -272,7 +280,7 @@ def parameters_of(data: xr.Dataset) -> dict[str, Any]:
 
 
 def parameters_at(case: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of one case: those of the series, with the values of this case on the axes."""
+    """Return the parameters of one case: the fixed parameters of its series, and its values on the axes."""
     parameters = parameters_of(case)
     for axis in case.attrs.get("axes", []):
         *above, last = axis["path"].split(".")

@@ -22,7 +22,7 @@ Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values with the ends of their 95 % intervals, NaN if the error is unknown."""
+    """Values, and the two ends of their 95 % intervals. The ends are NaN if the error is unknown."""
 
     value: Any
     low: Any
@@ -33,9 +33,9 @@ class Mean(NamedTuple):
 class Axis:
     """An axis of a panel. Symbols in the label are mathtext between dollar signs.
 
-    `ticks` are positions and texts, for values that are words. A limit that is None follows from the data. `quantity`
-    is the parameter or output on the axis, empty for a derived quantity. `reverse` means that values increase downwards
-    or to the left.
+    If the values are words, `ticks` are the positions and texts of the ticks. If the limit `low` or `high` is None, it
+    follows from the data. `quantity` is the name of the parameter or output on the axis; it is empty if a derived
+    quantity is on the axis. `reverse` means that values increase downwards or to the left.
     """
 
     label: str
@@ -73,9 +73,10 @@ class Trace:
 
     Kinds: ``curve`` and ``law`` are points, joined if `line` is not empty; ``band`` fills the area from ``y_low`` to
     ``y_high``; ``dots`` and the cells of a ``map`` are coloured by ``value``; ``absent`` are marks at the lower edge of
-    the panel. `data` holds ``x``, ``y`` and ``value`` in the units of the axes, the ends of known intervals as
-    ``y_low`` and so on, and the parameters of each point in SI as coordinates. `what` is ``data``, the name of a law,
-    or the reason why cases have no value. `bars` draws intervals as bars instead of a band.
+    the panel. The variables of `data` are ``x``, ``y`` and ``value`` in the units of the axes, and the ends of their
+    intervals where these are known, such as ``y_low`` and ``y_high``. The coordinates of `data` are the parameters of
+    each point in SI. `what` is ``data``, the name of a law, or the reason why cases have no value. `bars` draws
+    intervals as bars instead of a band.
     """
 
     kind: Kind
@@ -127,9 +128,10 @@ class Panel:
 class Figure:
     """A figure as data.
 
-    Every `stack` successive panels form a column; with 1, panels fill row after row. `fixed` lists the fixed
-    parameters, and `bars` explains bars and bands. `left_out` are texts about results that are not drawn. `ratio` is
-    the height of a panel divided by its width. `share_y` gives all panels the same vertical axis.
+    With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form the next column; with ``stack = 1``, the
+    panels fill row after row. `fixed` is a text with the fixed parameters, and `bars` is a text that explains the error
+    bars and bands. `left_out` are texts about results that are not drawn. `ratio` is the height of a panel divided by
+    its width. `share_y` gives all panels the same vertical axis.
     """
 
     panels: list[Panel]
@@ -143,11 +145,11 @@ class Figure:
     share_y: bool = False
 
     def leave_out(self, sentences: Iterable[str]) -> None:
-        """Add texts about results that are not drawn, without empty texts and duplicates."""
+        """Add texts about results that are not drawn. Empty texts and texts that are already present are ignored."""
         self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
 
     def judge(self, law_holds: str) -> None:
-        """State whether a fitted law holds, as a warning unless the answer is yes."""
+        """Write on the figure whether a fitted law holds. Every answer except yes is a warning."""
         if law_holds.startswith("yes"):
             self.bars = f"{self.bars}; {law_holds}"
         else:
@@ -176,7 +178,9 @@ class Figure:
         return {str(name): str(value.attrs.get("units", "1")) for name, value in coords}
 
     def head(self, origin: Mapping[str, str]) -> list[str]:
-        """Return the comment lines above the table: origin, fixed parameters, units, and labels of each panel."""
+        """Return the comment lines above the table: `origin`, title, warnings, fixed parameters, units, and labels of
+        the panels.
+        """
         table = self.table()
         units = table.attrs["units"]
         held = {
@@ -200,10 +204,8 @@ def _number(value: Any) -> str:
 
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
-    """Return the data of a trace: the arrays ``x``, ``y`` and ``value``, and the coordinates of `of` as parameters.
-
-    A `Mean` also gives the ends of its interval. An array without named dimensions gets those of another array of the
-    same shape.
+    """Return the data of a trace: the given arrays (``x``, ``y``, ``value``), and the coordinates of `of` as
+    parameters. A `Mean` gives three arrays, such as ``y``, ``y_low`` and ``y_high``; unknown ends are left out.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -232,7 +234,7 @@ def _apart(name: Any) -> str:
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
-    """Return the edges of cells around the values of an axis: the middles between the values, or between their
+    """Return the edges of cells around the values of an axis: halfway between neighbouring values, or between their
     logarithms.
     """
     if centres.size == 1:

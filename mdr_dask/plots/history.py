@@ -29,7 +29,9 @@ STEADY = "steady state at the end"
 
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw friction against time, one column for each series, with panels for a velocity and a force that change."""
+    """Draw friction against time, one column of panels for each series. Velocity and normal force have a panel only if
+    they change.
+    """
     needed = {BEFORE, JUMP, FRICTION}
     found = {name: data for name, data in groups.items() if needed <= data.keys() and data[FRICTION].notnull().any()}
     if not found:
@@ -82,7 +84,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
 
 
 def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
-    """Return friction before the history, just after the start of the history, and during the history."""
+    """Return the friction of one curve: before the history starts, just after its start, and during the history."""
     before = curves.mean(case, BEFORE)
     at_once = case.assign({JUMP: (case[BEFORE] + case[JUMP]).assign_attrs(case[JUMP].attrs)})
     errors = [aggregation.companion(case, name) for name in (BEFORE, JUMP)]
@@ -98,7 +100,9 @@ def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
 
 
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times up to `last` in units of the relaxation time, velocities in m/s and normal forces in N."""
+    """Return times divided by the relaxation time, velocities in m/s and normal forces in N. The times end at
+    `last`.
+    """
     unit = case.time_unit()
     (speed, force), parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
     found = [np.array([[-LEAD * last, 0.0], [speed, speed], [force, force]])]

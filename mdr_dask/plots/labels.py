@@ -66,8 +66,9 @@ class Quantity(NamedTuple):
 def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     """Return the units in which figures show the quantities of some series.
 
-    These are the units of the campaign files if all files agree; otherwise degrees Celsius for temperatures, and SI
-    units with a prefix for which the largest value is between 1 and 1000.
+    If all campaign files use the same unit for a quantity, figures show this unit. Otherwise temperatures are in
+    degrees Celsius, and other quantities are in SI units, with a prefix that brings the largest value between 1 and
+    1000.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -83,7 +84,7 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
 
 
 def symbols(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the labels of the coordinates of some series that are not labelled by their name."""
+    """Return the labels of those coordinates whose label is not their name, for all given series together."""
     found = dict(SYMBOLS) if all(data.attrs.get("model") in models.NAMES for data in groups.values()) else {}
     for data in groups.values():
         own = set(data.dims) - set(data["status"].dims) if "status" in data else set()
@@ -122,7 +123,9 @@ def quantity(name: str, values: xr.DataArray) -> Quantity:
 
 
 def meaning(values: xr.DataArray, name: str) -> str:
-    """Return the long name of an output with symbols as mathtext and without explanations."""
+    """Return the long name of an output. Symbols are mathtext, and explanations after ``;``, ``,`` or ``(`` are
+    removed.
+    """
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
     for ascii_form, symbol in _MATHTEXT.items():
         words = re.sub(ascii_form, symbol, words)

@@ -19,7 +19,8 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 def draw_master_curve(curve: xr.Dataset) -> Figure:
     """Draw a master curve: the curves as measured, the merged curve and the shift factors.
 
-    Bars and band are 68 % intervals. The merged curve is dashed beyond the range measured at the reference.
+    Bars and band are 68 % intervals. The merged curve is solid in the range that was measured in the reference
+    condition, such as the reference temperature, and dashed outside this range.
     """
     curve = _in_shown_units(curve)
     attrs = curve.attrs
@@ -55,7 +56,7 @@ def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _channels(curve: xr.Dataset) -> dict[str, str]:
-    """Return the names and markers of the ordinates of a master curve; two ordinates were shifted together."""
+    """Return names and markers of the ordinates: a master curve has one ordinate, or two that were shifted together."""
     return {name: marker for name, marker in (("ordinate", "."), ("companion", "x")) if f"curve_{name}" in curve}
 
 
@@ -105,7 +106,9 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
 
 
 def _lines(curve: xr.Dataset, channel: str) -> list[Trace]:
-    """Return the traces of a merged curve, solid in the range measured at the reference, and of its band."""
+    """Return the traces of a merged curve: its band, the dashed curve, and the solid part measured in the reference
+    condition.
+    """
     x, y = curve["curve_abscissa"].values, curve[f"curve_{channel}"].values
     error = 10 ** curve["curve_error" if channel == "ordinate" else "curve_companion_error"].values
     ends = curve["curve_abscissa"].attrs

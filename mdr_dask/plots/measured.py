@@ -27,7 +27,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Add a table of measurements to the series, and its points to the figures. Return series and figures."""
+    """Return series to which the table of measurements in `file` is added, and figures that also show its points."""
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
 
@@ -109,14 +109,14 @@ def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
 
 
 def _differing(curves: list[xr.Dataset]) -> set[str]:
-    """Return the parameters in which curves differ."""
+    """Return the names of the parameters whose values are not the same in all curves."""
     held = [{str(name): value.item() for name, value in each.coords.items() if value.ndim == 0} for each in curves]
     names = {name for each in held for name in each}
     return {name for name in names if len({each.get(name) for each in held}) > 1}
 
 
 def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
-    """Return a mask of the measured points whose conditions are the parameters of a curve."""
+    """Return a mask of the measured points whose conditions equal the parameters of a curve."""
     here = np.ones(measured.values.size, dtype=bool)
     for name, values in measured.conditions.items():
         if name != along and name in curve.coords and curve[name].ndim == 0:
@@ -125,13 +125,10 @@ def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
 
 
 def _near(axis: Axis, drawn: FloatArray, places: FloatArray) -> np.ndarray:
-    """Return a mask of the places that are no farther from the drawn values than these values are spread.
-
-    Farther points would squeeze the curves. Values that are all equal cannot be squeezed.
+    """Return a mask of the measured points that are close enough to the curves along one axis. If the curves go from 1
+    to 3, points from -1 to 5 are close enough; points farther away would squeeze the curves.
     """
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # zero and negative numbers have no place on a logarithmic axis
+    with np.errstate(divide="ignore", invalid="ignore"):  # a logarithmic axis cannot show zero or negative numbers
         drawn, places = (np.log(each) if axis.log else each for each in (drawn, places))
     low, high = drawn[np.isfinite(drawn)].min(), drawn[np.isfinite(drawn)].max()
     spread = (high - low) or np.inf

@@ -36,10 +36,11 @@ COLUMN, TALLEST = 0.085 / INCH, 0.23 / INCH
 class Page:
     """The requested appearance of a figure.
 
-    `width` and `height` are in inches; without a height, the height follows from the content. `title` None means a
-    description of the figure, but no title if a width is requested. `style` is a style or style file of matplotlib, and
-    `cycle` holds the colours, lines and markers of this style. `units` are requested units by quantity, `used`
-    collects the quantities that figures have shown, and `symbols` are labels of coordinates with a symbol.
+    `width` and `height` are in inches; without a height, the height follows from the content. If `title` is None, a
+    description of the figure is the title, or there is no title if a width is requested. `style` is a style or style
+    file of matplotlib, and `cycle` holds the colours, lines and markers of this style. `units` maps names of quantities
+    to the requested units, and `symbols` maps names of coordinates to their labels. `used` collects the names of all
+    quantities that figures have shown.
     """
 
     width: float | None = None
@@ -66,7 +67,7 @@ def requested(
     style: str | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Page:
-    """Return the `Page` for the options of a command; `size` has the form that `sides` reads."""
+    """Return the `Page` for the options of a command. `size` is a text such as ``85x60mm`` (see `sides`)."""
     width, height = sides(size) if size else (None, None)
     return Page(width, height, title, style, units or {})
 

@@ -87,8 +87,8 @@ def render(description: Figure) -> Drawn:
 def _grid(description: Figure) -> tuple[int, int]:
     """Return the numbers of rows and columns of panels.
 
-    On a screen, up to three columns are filled evenly. A requested width has as many columns as a journal, and up to
-    twice as many if the rows would not fit on a page.
+    On a screen, there are up to three columns. If a width is requested, a column of panels is about as wide as a column
+    of a journal. If the rows would then not fit on a page, there are up to twice as many columns.
     """
     width, stack = page.current().width, description.stack
     stacks = -(-len(description.panels) // stack)
@@ -106,7 +106,7 @@ def _least_height() -> float:
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
-    """Return the axes of all panels. The stacks of panels fill rows of stacks from left to right."""
+    """Return the axes of all panels. Stacks of panels fill a row from left to right, then the next row."""
     grid, stack = figure.subplots(rows, columns, squeeze=False, sharey=description.share_y), description.stack
     found = []
     for k in range(len(description.panels)):
@@ -119,7 +119,9 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Remove the label of an axis that equals the axis of the panel below or on the left."""
+    """Remove the label of a horizontal axis if the panel below has the same axis, and the label of a vertical axis if
+    the panel on the left has the same axis.
+    """
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -158,7 +160,9 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Set the ticks of a logarithmic axis; with less than two decades, plain numbers such as 1, 2, 5, 10 and 20."""
+    """Set the ticks of a logarithmic axis. If the axis has less than two decades, its numbers are plain, such as 1, 2,
+    5, 10, 20 and 50.
+    """
     from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
@@ -301,7 +305,9 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels and return its height in inches; at a requested size, a third of it at most."""
+    """Draw one legend below all panels and return its height in inches. If a size is requested, the legend takes at
+    most a third of the height, and the last entries are left out if necessary.
+    """
     width, asked = figure.get_figwidth(), page.current()
     most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 3
     size = mpl.rcParams["legend.fontsize"]
@@ -323,7 +329,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn) -> None:
-    """Break long labels and thin out ticks that overlap, again after each change of the size of the axes."""
+    """Break long labels, and remove ticks that overlap. This is repeated, because the axes then change their size."""
     for _ in range(4):
         figure.draw_without_rendering()
         changed = False
@@ -343,7 +349,7 @@ def _fit(figure: Drawn) -> None:
 
 
 def _thin(figure: Drawn, axis: Any, name: str) -> bool:
-    """Keep every second (or third, ...) tick of an axis, so that texts do not overlap; return whether ticks changed."""
+    """Keep only every second (or third, ...) tick of an axis if texts overlap. Return whether ticks were removed."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
@@ -354,7 +360,7 @@ def _thin(figure: Drawn, axis: Any, name: str) -> bool:
     }
     boxes = [text.get_window_extent(renderer) for text in texts.values()]
     ends = [(box.x0, box.x1) if name == "x" else (box.y0, box.y1) for box in boxes]
-    gap = 3 / 72 * figure.dpi if name == "x" else 0.0  # 3 points
+    gap = 3 / 72 * figure.dpi if name == "x" else 0.0  # a point is 1/72 inch
     step = 1
     while len(ends[::step]) > 2 and any(
         one[1] + gap > two[0] for one, two in zip(sorted(ends[::step])[:-1], sorted(ends[::step])[1:], strict=True)

@@ -15,16 +15,18 @@ if TYPE_CHECKING:
     from mdr_dask.models.parts.surface_report import FileReport
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-#: Colours and lines of straight cuts in both directions; label of the line that represents a surface in the method.
+#: `CUTS`: colour and line style of the straight cuts in each direction. `METHOD`: label of the line that represents the
+#: surface in the method of dimensionality reduction.
 CUTS = ("#a0a0a0", "-"), ("#505050", ":")
 METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
-    """Draw the power spectrum C2D of every file with a power law, and the spectra of lines.
+    """Draw the power spectrum C2D of every file with its power law, and the spectra of lines.
 
-    The lines are straight cuts through the surface, and the lines that represent the surface in a campaign. `spectra`
-    are those that a campaign uses: between the cut-offs and without noise.
+    There are two kinds of lines: straight cuts through the surface, and the lines that represent the surface in a
+    campaign. `spectra` are the spectra that a campaign uses: they contain only wave numbers between the cut-offs, and
+    no noise.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
     areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True))

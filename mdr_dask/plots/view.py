@@ -20,11 +20,12 @@ from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: Largest numbers of panels for one output, and of characters in one line of the text at a tick.
+#: Largest number of panels for one output. Largest number of characters in one line of the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: Largest numbers of parameters, and of cases drawn as points, in a figure of main effects.
+#: In a figure of main effects: largest number of parameters, and largest number of cases that are drawn as points.
 MOST_EFFECTS, MOST_POINTS = 12, 5000
-#: Marks for cases without a value, and for cases whose mean may be biased because some realisations failed.
+#: `MARKS`: marks for cases without a value. `SOME`: mark for cases whose mean may be biased, because some of their
+#: realisations failed.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -37,11 +38,12 @@ SOME = "v", "mean without realisations that failed"
 class View:
     """The description of a figure of outputs; several outputs are drawn one above the other.
 
-    `over` is the horizontal axis; two parameters make a map, none makes the main effects of all parameters. `by` is
-    shown by colours, and `panels` differ in one parameter. `log` contains the letters of the logarithmic axes (x, y,
-    and z for colours); by default, an axis is logarithmic if its numbers are positive and span more than a factor of
-    ten. `single` draws the first realisation instead of the mean. `apart` gives every curve its own panel. `guides`
-    maps an output to the positions and names of horizontal lines.
+    `over` is the parameter on the horizontal axis; with two parameters, the figure is a map, and with none, it shows
+    the main effects of all parameters. Colours show the values of the parameter `by`. There is one panel for each value
+    of the parameter `panels`. `log` contains the letters of the logarithmic axes (x, y, and z for colours); by default,
+    an axis is logarithmic if its numbers are positive and span more than a factor of ten. If `single` is true, the
+    first realisation is drawn instead of the mean. If `apart` is true, every curve has its own panel. `guides` contains
+    the positions and names of horizontal lines for each output.
     """
 
     outputs: str | tuple[str, ...]
@@ -60,20 +62,20 @@ class View:
 
     @property
     def along(self) -> tuple[str, ...]:
-        """Names of the parameters on the axes."""
+        """Names of the parameters in `over`."""
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
     def is_log(self, which: str, values: Any, how: labels.Quantity) -> bool:
-        """Return whether an axis is logarithmic; by default, an axis in degC is not."""
+        """Return whether an axis is logarithmic. Unless the view requests it, an axis in degC is linear."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
         return not how.offset and labels.is_geometric(values) if self.log is None else which in self.log and positive
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameter of an output with the most values, or the own dimension of the output, such as time.
-
-    A sampled study has no such axis: the result is empty, and the figure shows main effects.
+    """Return the parameter with the most values, of all parameters with which an output varies. If the output has a
+    dimension of its own, such as time, this dimension is returned instead. In a sampled study, the result is empty, so
+    that the figure shows main effects.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -111,8 +113,8 @@ def figure_of(
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     """Draw the outputs of views, several outputs one above the other.
 
-    A view that cannot be drawn is named below the figure, unless another view shows its output. If nothing can be
-    drawn, DataError gives the reason for each series.
+    If a view cannot be drawn, the figure states the reason, unless another view shows the same output. If no view can
+    be drawn, DataError is raised with the reason for each series.
     """
     figures, shown, reasons = [], [], []
     missing: dict[str, list[str]] = {}
@@ -124,7 +126,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
         reasons += why
         if view.single:
             most = max(data.sizes.get("realisation", 1) for data in found.values())
-            reasons += [f"realisations but the first of {most}"] * (most > 1)
+            reasons += [f"all realisations except the first of {most}"] * (most > 1)
             found = {name: data.isel(realisation=[0]) for name, data in found.items()}
         form = {0: _effects, 1: _lines, 2: _map}[len(view.along)]
         figures.append(form(found, view, output))
@@ -172,7 +174,7 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
 
 
 def _unfit(data: xr.Dataset, view: View, output: str) -> str:
-    """Return the reason why a series cannot be drawn as requested; empty if it can be drawn."""
+    """Return the reason why a series cannot be drawn as requested, or an empty text if it can be drawn."""
     own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
     known = [*varied(data, output), *own]
     for name in (*view.along, view.by, view.panels):
@@ -211,7 +213,9 @@ def _subject(view: View, output: str, found: Mapping[str, xr.Dataset], more: int
 
 
 def _places(data: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the positions of values along an axis: numbers in the shown unit; 0, 1, 2, ... if the values are words."""
+    """Return the positions of the values of a parameter along an axis: numbers in the shown unit, or 0, 1, 2, ... for
+    words.
+    """
     values = data[name]
     shown = labels.shown(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
     return xr.DataArray(shown, dims=values.dims)
@@ -268,10 +272,10 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 
 
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
-    """Return the contents of the panels, and texts about what is left out.
+    """Divide the curves of a figure into panels. Also return texts about what is left out.
 
-    Panels are the values of `View.panels`, the curves of a view with `apart`, or else all series in one panel. If this
-    panel would have too many curves, each series gets a panel.
+    With `View.panels`, each value of this parameter has a panel; with `View.apart`, each curve has one. Otherwise there
+    is one panel, or one for each series if one panel would have more curves than colours.
     """
     if view.panels:
         return _by_value(found, view)
@@ -310,7 +314,9 @@ def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]
 
 
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
-    """Draw the curves of all series of a panel and their laws, and mark the cases without a value."""
+    """Draw one panel: the curves of all its series, the laws for these curves, and marks for the cases without a
+    value.
+    """
     panel = Panel(x, Axis(""), title=part.title, bar=next(iter(families.values())).bar)
     along, law_name = view.along[0], ""
     marked: dict[str, str] = {}
@@ -353,7 +359,7 @@ def _families(series: Mapping[str, xr.Dataset], view: View, output: str) -> dict
     if len(series) > 1 and first > colours.most():
         raise DataError(
             f"expected at most {colours.most()} curves of several series in a panel, got {first}: "
-            "--select fewer, or leave --panels out"
+            "draw fewer curves with --select, or leave out --panels"
         )
     return found
 
@@ -368,7 +374,7 @@ def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
 
 
 def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
-    """Add to the data of a curve the number of realisations in each mean, as a coordinate."""
+    """Add a coordinate to the data of a curve: the number of realisations over which each mean is taken."""
     if "realisation" not in data[output].dims:
         return data
     count = xr.DataArray(aggregation.count(data[output]).variable, attrs={"units": "1"})
@@ -402,7 +408,9 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 
 
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw an output against two parameters: cells for the cases of a grid, points for a sampled study."""
+    """Draw an output against two parameters. The cases of a grid are drawn as cells, those of a sampled study as
+    points.
+    """
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without --by, because colours show the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
@@ -473,7 +481,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
 
 
 def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
-    """Return the mean of an output for every value of one axis, over all other axes."""
+    """For every value of one axis, return the mean of an output over all other axes, and the interval of this mean."""
     rest = [dim for dim in curves.axes_of(data, output) if dim != name]
     error = aggregation.companion(data, output)
     pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
@@ -481,7 +489,9 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Sort n cases of a sampled study by one parameter, divide them into sqrt(n) groups, and return the group means."""
+    """Sort the n cases of a sampled study by one parameter, divide them into sqrt(n) groups, and return the means of
+    the groups.
+    """
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
     order = np.argsort(cases[name].values, kind="stable")

@@ -15,7 +15,7 @@ from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Number, Status
 from mdr_dask.questions.expression import Value, evaluate, parse
 
-#: Names of two columns: the state of the results of a row, and the number of results of the row that are finished.
+#: Names of two columns: the state of a row, and the number of results in this row that are done.
 STATUS, REALISATIONS = "status", "realisations"
 #: Name of the variable with the number of results in each state. Only rows that are averages over cases have it.
 COUNTS = "state_counts"
@@ -25,7 +25,7 @@ WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of the model of a study by name; none if the model cannot be loaded."""
+    """Return the dimensionless numbers of a model by name. The result is empty if the model cannot be loaded."""
     try:
         return {number.name: number for number in models.load(str(dataset.attrs.get("model"))).numbers}
     except ModelError:
@@ -33,7 +33,7 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the fixed parameters whose value is a word, by name with ``_`` for dots."""
+    """Return the fixed parameters whose value is a word. Dots in their names are replaced by ``_``."""
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
@@ -62,7 +62,9 @@ class Columns:
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit; None if the name is unknown. An output is averaged over the realisations."""
+        """Return a column with its unit, or None if there is no such column. Outputs are averaged over the
+        realisations.
+        """
         if name not in self._found:
             self._found[name] = None  # prevents an infinite recursion if a formula refers to itself
             self._found[name] = self._make(name)
@@ -76,7 +78,9 @@ class Columns:
         return found
 
     def unknown(self, name: str) -> DataError:
-        """Return the error for an unknown column, or for a dimensionless number that needs a missing quantity."""
+        """Return the error to raise for a name that is unknown, or for a dimensionless number if the study lacks a
+        quantity in its formula.
+        """
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
@@ -93,7 +97,7 @@ class Columns:
         return evaluate(expression, self.find, self.known)
 
     def truth(self, condition: str) -> xr.DataArray:
-        """Return where a condition is true."""
+        """Return an array that is true where a condition is met."""
         found = xr.DataArray(self.evaluate(condition).array)
         if found.dtype != bool:
             raise DataError(f"{condition!r}: expected a comparison such as 'hurst < 0.7'")
@@ -120,7 +124,9 @@ class Columns:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the outputs from which columns are computed, including outputs in formulas of dimensionless numbers."""
+    """Return the names of the outputs that are needed to compute columns, including those in formulas of dimensionless
+    numbers.
+    """
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:
@@ -131,7 +137,7 @@ def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
 
 
 def counts(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the number of results of every row in each state. The states are along the dimension ``state``."""
+    """For every row, return how many of its results are done, failed, missing, ... along the dimension ``state``."""
     if COUNTS in dataset:
         return dataset[COUNTS]
     status = dataset[STATUS]
@@ -140,7 +146,9 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several results."""
+    """Return the state of every row as text. A row of one result has a state such as ``failed``, and a row of several
+    results has a state such as ``2 failed, 1 missing``.
+    """
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:
         status = dataset[STATUS]
         return status.copy(data=WORDS[status.to_numpy()]).drop_attrs()

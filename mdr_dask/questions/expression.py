@@ -26,8 +26,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: In conditions and selections, numbers count as equal if their relative difference is at most this, because tables
-#: show six digits.
+#: In conditions and selections, two numbers count as equal if their relative difference is at most `SAME`: users copy
+#: numbers from tables, which show six digits.
 SAME = 1e-5
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -52,8 +52,9 @@ Find = Callable[[str], xr.DataArray | None]
 class Value(NamedTuple):
     """The value of an expression: numbers in SI, words, or truth values.
 
-    `dimension` is the dimension of numbers as an object of pint. It is None for words, truth values and numbers without
-    a unit. A number without a unit is taken in the SI unit of the quantity with which it is combined.
+    `dimension` is the physical dimension of the numbers, such as length, as defined by pint. It is None for words,
+    truth values and numbers without a unit. If a number without a unit is compared with a quantity or added to it, the
+    number counts as a value in the SI unit of this quantity.
     """
 
     array: Any
@@ -61,13 +62,17 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The letter of numpy for the data type. A lazy array is not loaded."""
+        """The letter with which numpy abbreviates the data type, such as ``f`` for floats. A lazy array is not
+        computed.
+        """
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed text. In its syntax tree, names replace quantities with units; `quantities` are these quantities."""
+    """A parsed text. In the syntax tree `tree`, a name such as ``_quantity_0`` stands for a number with a unit;
+    `quantities` maps these names to their values.
+    """
 
     text: str
     tree: ast.expr
@@ -81,7 +86,7 @@ class Expression:
 
 
 def parse(text: str) -> Expression:
-    """Read a condition or a formula; raise DataError if the text is neither."""
+    """Parse a condition or a formula. Raise DataError if the text is not a valid expression."""
     wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7'"
     if len(text) > _LONGEST:
         raise DataError(f"{wanted}, got {len(text)} characters")
@@ -94,16 +99,20 @@ def parse(text: str) -> Expression:
 
 
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
-    """Return the value of an expression. Unknown names and quantities of different kinds raise DataError.
+    """Return the value of an expression. An unknown name raises DataError, and so does the comparison of a length with
+    a time.
 
-    `find` returns the values of a name with ``attrs["units"]``, or None. Messages suggest names from `known`.
+    `find` returns the values of a column with its unit in ``attrs["units"]``, or None if there is no column of this
+    name. Error messages suggest names from `known`.
     """
     with np.errstate(all="ignore"):
         return _Evaluation(expression, find, known).value(expression.tree)
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Replace every quantity, which is a number and a unit, by a name, because Python cannot parse units."""
+    """Replace every number with a unit by a name, because Python cannot parse units. Also return the values of these
+    names.
+    """
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):
@@ -138,7 +147,9 @@ def _likely_mistake(text: str) -> str:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name in a node of the syntax tree. Dots in the name of a nested parameter become ``_``."""
+    """Return the name that a node of the syntax tree stands for. Dots in the name of a nested parameter become
+    ``_``.
+    """
     if isinstance(node, ast.Attribute):
         return f"{_name(node.value)}_{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
@@ -267,7 +278,7 @@ class _Evaluation:
             return Value(result, value.dimension)
         if name == "sqrt":
             return Value(result, value.dimension**0.5)
-        raise DataError(f"{self.text!r}: expected a pure number in {name}, got {_shown(value.dimension)}")
+        raise DataError(f"{self.text!r}: expected a pure number in {name}(...), got {_shown(value.dimension)}")
 
 
 def _shown(dimension: Any) -> str:

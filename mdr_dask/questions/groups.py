@@ -1,4 +1,6 @@
-"""Averages over cases. There is one average for each combination of values along some axes."""
+"""Averages over cases. All cases that have the same values along some axes form a group, and each group has one
+average.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,9 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     mean of all m_c, and ``u_r`` the sum over c of ``(x_cr - m_c) / (n_c C)``, where x_cr is a result of case c. The
     mean and the standard error of these R results are those of the group, even if n_c differs between cases.
 
-    `by` are names of axes, or of columns of a sampled study; `kept` marks the cases that are included. The groups are
-    along the dimension ``group``. The grid error of a group is the mean grid error of its cases.
+    `by` are names of axes, or of columns of a sampled study. If `kept` is given, only the cases where it is true are
+    included. In the result, the groups are along the dimension ``group``. The grid error of a group is the mean grid
+    error of its cases.
     """
     import xarray as xr
 
@@ -64,7 +67,9 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """The cases of all groups: their indices sorted by group, and the positions in `order` at which groups begin."""
+    """The cases of all groups. `order` are the indices of the cases, sorted by group, and group k begins at
+    ``order[starts[k]]``.
+    """
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]
@@ -75,7 +80,9 @@ class _Members:
         return np.diff(self.starts, append=self.order.size)
 
     def sums(self, values: NDArray[Any], dtype: type = float) -> NDArray[Any]:
-        """Return the sums of values over the cases of every group. The first dimension of `values` is that of cases."""
+        """Return the sum of `values` over the cases of each group. The first dimension of `values` is that of the
+        cases.
+        """
         if not self.order.size:
             return np.zeros((0, *values.shape[1:]), dtype)
         return np.asarray(np.add.reduceat(values[self.order], self.starts, axis=0, dtype=dtype))
@@ -97,7 +104,9 @@ def _members(
 
 
 def _common(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the results of every group for each realisation (see `averaged`), shape (groups, ..., realisations)."""
+    """Return the result of every group in each realisation (see `averaged`), with the shape (groups, ...,
+    realisations).
+    """
     there = np.isfinite(values)
     number = there.sum(axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):

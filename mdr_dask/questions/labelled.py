@@ -24,9 +24,9 @@ PIECE = 2**20
 
 
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
-    """Answer a question with lazy arrays: statistics with ``state_counts``, or single results with their ``status``.
+    """Answer a question with lazy arrays: statistics and ``state_counts``, or single results and their ``status``.
 
-    Cases that do not meet the condition are NaN.
+    The values of cases that do not meet the condition are NaN.
     """
     if question.sort:
         raise DataError("expected a table (.csv, .jsonl or .parquet) with --sort, got labelled arrays")

@@ -1,4 +1,4 @@
-"""The progress of a study: the number of results in each state, and groups of messages with the same text."""
+"""The progress of a study: the number of results in each state, and groups of messages that differ only in numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class Group(NamedTuple):
     """Messages of one series that differ only in their numbers.
 
-    `kind` is the state of the results, or ``warning`` if they are done. `cases` is the range of each varied parameter.
+    `kind` is the state of the results with these messages, such as ``failed``, or ``warning`` if the results are done.
+    `cases` is a text with the range of each varied parameter over these results.
     """
 
     series: str
@@ -31,7 +32,7 @@ class Group(NamedTuple):
 
 
 def counts(url: str) -> list[dict[str, Any]]:
-    """Return three facts for each series: the name, the number of results, and the number of results in each state."""
+    """For each series, return its name, the number of its results, and the number of results in each state."""
     found = []
     for name in store.series_names(url):
         status = store.ledger(url, name)
@@ -41,7 +42,9 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the message of the last attempt of each result of a series, unless its state has changed since."""
+    """Return the last message about each result of a series. A message is left out if the result now has another state
+    than the one that the message reports.
+    """
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
@@ -54,9 +57,11 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 
 
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
-    """Group messages that differ only in their numbers; each warning of a result is a message of its own.
+    """Group messages that differ only in their numbers. If a result has several warnings, each of them is a separate
+    message.
 
-    Quantities in the messages are converted to the units of the campaign file, which is an attribute of the `studies`.
+    `studies` are the series by name. Their attributes contain the campaign file, to whose units all quantities in the
+    messages are converted.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -78,7 +83,7 @@ def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) 
 
 
 def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Return the number of results with each warning, without details after a colon."""
+    """For each warning, return the number of results that have it. Details after the colon of a warning are removed."""
     groups: dict[str, list[str]] = {}
     for message in (each for each in found if each["status"] == "done"):
         for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
@@ -86,16 +91,17 @@ def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
     return {_merged(alike): len(alike) for alike in groups.values()}
 
 
-#: Pattern of a number, or of a range of numbers, with an SI unit that users often replace by another unit.
+#: Pattern of a number or range of numbers with an SI unit for which campaign files often use another unit.
 _QUANTITY = re.compile(
     r"(?<![\w.])(-?[\d.]+(?:e[-+]?\d+)?)((?:,? (?:to|and|or) -?[\d.]+(?:e[-+]?\d+)?)?) (K|rad/s|m/s|m|N|Pa)\b(?!\^)"
 )
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return the unit of the campaign file that replaces each SI unit in messages, if it is only one.
+    """Return the unit that replaces each SI unit in messages. It is the unit in the campaign file, if the file uses
+    only one.
 
-    Temperatures are in degC unless the file uses another unit.
+    Temperatures in K are converted to degC, unless the file uses another unit for temperatures.
     """
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
@@ -125,7 +131,9 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def _merged(texts: Sequence[str]) -> str:
-    """Merge texts that differ only in numbers. Different numbers become a range: ``a film ratio of 0.2 to 0.4``."""
+    """Merge texts that differ only in their numbers. Numbers that differ become a range: ``a film ratio of 0.2 to
+    0.4``.
+    """
     columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
 
     def ends(_: re.Match[str]) -> str:

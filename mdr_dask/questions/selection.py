@@ -43,7 +43,9 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply each selection to every series in which the selected parameter varies, or to the first series."""
+    """Apply each selection to every series in which the selected parameter varies. If it varies in no series, the
+    selection is applied to the first series, so that a wrong name or value raises an error.
+    """
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -54,7 +56,9 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases that meet a condition on means. All other results become NaN with the state *not needed*."""
+    """Keep the cases whose means over realisations meet a condition. The results of all other cases become NaN, and
+    their state becomes *not needed*.
+    """
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -70,7 +74,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
 
 
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
-    """Return the group of a series. If `series` is None, return the only group."""
+    """Return the group of the series called `series`. If `series` is None, return the only group of the study."""
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
@@ -98,7 +102,7 @@ def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None)
 
 
 def written(value: Any, unit: str | None, digits: int = 6) -> str:
-    """Return a value and its unit as text, written as in a selection."""
+    """Return a value and its unit as text, in the form that a selection reads."""
     if not isinstance(value, int | float | np.number):
         return str(value)
     return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
@@ -132,7 +136,7 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return a mask of the selected values of an axis."""
+    """Return a mask of the values of an axis that a selection keeps."""
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
@@ -174,7 +178,9 @@ def _words(text: str) -> list[str]:
 
 
 def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return a mask that selects the value nearest to a number, or no value if the number lies outside the axis."""
+    """Return a mask of the value nearest to a number. If the number is outside the range of the axis, no value is
+    selected.
+    """
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -189,7 +195,7 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the two ends of every range of a selection. The two ends of a single value are equal."""
+    """Yield the two ends of every range in a selection. A single value is a range with equal ends."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]
@@ -219,7 +225,7 @@ def _number(text: str, name: str, unit: str) -> float:
 
 
 def _extent(values: NDArray[Any], unit: str) -> str:
-    """Return a text about the values of an axis, for messages."""
+    """Describe the values of an axis, for error messages."""
     if values.size == 1:
         return f"it is {written(values[0], unit)} everywhere"
     if values.size <= 6:

@@ -34,9 +34,10 @@ ROWS, WHOLE = 2**16, 2**26
 class Question:
     """A question about a group of a study. Without statistics, the table has one row for each result.
 
-    `where` is a condition on single results, or on means if there are statistics. A row of `group_by` is an average
-    over all other axes. `sort` contains columns or formulas, with a leading ``-`` for descending order. `units` are
-    units by column. If `written` is true, axes and parameters are in the units of the campaign file instead of SI.
+    `where` is a condition on single results, or on means if there are statistics. With `group_by`, the table has one
+    row for each combination of values of these axes, averaged over all other axes. `sort` contains columns or formulas,
+    with a leading ``-`` for descending order. `units` maps columns to the requested units. If `written` is true, axes
+    and parameters are in the units of the campaign file instead of SI.
     """
 
     outputs: tuple[str, ...] = ()
@@ -71,7 +72,8 @@ class Table:
 
 
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
-    """Answer a question about a group of a study with rows, which are computed when their data frame is read.
+    """Answer a question about a group of a study. The rows of a data frame are computed when the caller reads this
+    frame.
 
     Unless the question sorts rows, the memory needed does not grow with the number of rows. `limit` is the number of
     rows that the caller will read, or 0 for all. Unknown names raise DataError before any row is computed.
@@ -112,7 +114,7 @@ class _Maker:
         self.keys = 0
 
     def units(self) -> dict[str, str]:
-        """Compute one row, and return the units of the columns. Errors in the question are raised by this method."""
+        """Compute one row, so that errors in the question are raised at once, and return the units of the columns."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
@@ -126,7 +128,9 @@ class _Maker:
                 yield self._frame(rows)[0]
 
     def order(self) -> NDArray[np.intp]:
-        """Sort the rows. For each row of the sorted order, return its position in the order of the axes."""
+        """Sort the rows. Entry k of the result is the position that row k of the sorted table has in the unsorted
+        table.
+        """
         import pandas as pd
 
         question = self._question
@@ -139,7 +143,7 @@ class _Maker:
         return ordered
 
     def picked(self, places: NDArray[np.intp]) -> Iterator[pd.DataFrame]:
-        """Yield frames of the rows at given positions, in the order in which the positions are given."""
+        """Yield frames of the rows at the positions `places`, in the order of `places`."""
         data = self._data.load() if places.size > ROWS else self._data
         for start in range(0, places.size, ROWS):
             along = np.unravel_index(places[start : start + ROWS], tuple(self.sizes.values()))
@@ -164,7 +168,9 @@ class _Maker:
 
     @property
     def may_leave_out(self) -> bool:
-        """Whether some cases may have no row, because an adaptive axis does not need these cases."""
+        """Whether the table may have fewer rows than the study has cases, because an adaptive axis does not need all
+        cases.
+        """
         adaptive = "adaptive:" in str(self._data.attrs.get("campaign", ""))
         return adaptive and not (self._raw or self._question.group_by)
 
@@ -229,9 +235,10 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes of at most `most` points, in the order of the rows of the table, last dimension fastest.
+    """Divide a grid into boxes of at most `most` points. The boxes are in the order of the rows of the table, in which
+    the last dimension varies fastest.
 
-    A box that is longer than a chunk of the store ends at the end of a chunk.
+    If a box extends over several chunks of the store, it ends where a chunk ends.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

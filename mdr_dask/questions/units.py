@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 #: Suffixes of statistics that are values of an output, such as the mean.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: Suffixes of statistics that are differences between values of an output, such as errors. If these statistics are
-#: temperatures, the zero point of the scale is ignored when they are converted.
+#: Suffixes of statistics that are differences between values of an output, such as errors. Differences of temperatures
+#: are converted without the zero point of the scale: an error of 5 K is an error of 5 degC.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 

@@ -1,4 +1,4 @@
-"""Means and errors of all cases of a study, for figures whose axes the reader of the page chooses."""
+"""Means and errors of all cases of a study. With these, the reader of the page can choose the axes of figures."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
 
 
 def cases_of(groups: Mapping[str, xr.Dataset], left_out: Mapping[str, list[str]]) -> list[Json]:
-    """Return the cases of each series, with columns that have one entry for each case, in the units of the figures.
+    """Return the cases of each series as columns: lists with one entry for each case, in the units of the figures.
 
-    ``at`` has a column for each varied parameter, ``states`` is a column of states. ``values`` has for each output:
-    ``value``, ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error). ``reduced`` are the texts from
-    `thinned`.
+    ``at`` has a column for each varied parameter, and ``states`` is the column of the states of the cases. ``values``
+    has up to five columns for each output: ``value`` (mean), ``low`` and ``high`` (interval), ``lines`` (standard
+    error) and ``grid`` (grid error). ``reduced`` are the texts about omitted values that `thinned` returned.
     """
     found = [_series(name, data, left_out[name]) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -71,7 +71,9 @@ def _named(name: str, values: xr.DataArray) -> Json:
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
-    """Return a list with one value for each case, repeated along the dimensions that the values lack."""
+    """Return a list with one value for each case. If `values` do not depend on a dimension of the cases, they are
+    repeated along it.
+    """
     along = xr.DataArray(np.asarray(values), dims=dims)
     return numbers(along.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel())
 

@@ -16,9 +16,9 @@ from mdr_dask.plots.figure import LAST, Axis, Bar, Figure, Panel, Trace, edges
 from mdr_dask.plots.labels import plain
 from mdr_dask.report.words import markup
 
-#: Largest number of points of one figure; of more points, only every n-th is on the page.
+#: Largest number of points of one figure. A figure with more points is thinned: only every n-th point is on the page.
 MOST_POINTS = 20_000
-#: Numbers of significant digits, and of colours of a colour bar.
+#: `DIGITS`: number of significant digits. `SHADES`: number of colours of a colour bar.
 DIGITS, SHADES = 9, 17
 
 Json = dict[str, Any]
@@ -76,7 +76,9 @@ def _axis(axis: Axis) -> Json:
 
 
 def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> Json:
-    """Return one curve, law or map as data: every `step`-th point, in the order in which a curve joins the points."""
+    """Return one trace as data, with every `step`-th point. The points of a curve are in the order in which the curve
+    joins them.
+    """
     rows = trace.frame()
     if trace.kind == "curve" and trace.line:
         rows = rows.sort_values("x", kind="stable")

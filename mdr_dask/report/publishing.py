@@ -65,7 +65,9 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that it names. Files outside the folder of the campaign get names inside it."""
+    """Return the campaign and the files that it names. A file outside the folder of the campaign is renamed into this
+    folder, and the campaign then contains the new name.
+    """
     text, found = study.campaign, {}
     for file in _named_files(url):
         name = PurePosixPath(str(file["name"]).replace("\\", "/"))
@@ -87,7 +89,9 @@ def _read(file: Mapping[str, str]) -> bytes:
 
 
 def _named_files(url: str) -> list[dict[str, str]]:
-    """Return the files that a campaign names: the entries of the parameters with a name, a path and a digest."""
+    """Return name, path and digest of each file that a campaign names, as found in the parameters and axes of the
+    store.
+    """
     held: dict[str, dict[str, str]] = {}
 
     def look(part: Any) -> None:

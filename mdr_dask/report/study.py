@@ -46,10 +46,11 @@ class Table(NamedTuple):
 class Study:
     """The content of a page about one study.
 
-    `understood` are the tables of axes, fixed parameters and outputs. `failures` are failures and warnings whose
-    messages differ only in their numbers. `not_fitted` and `not_drawn` are laws and figures without data, with the
-    reasons. `figures` and `cases` come from the modules of these names. `rerun` are commands that compute the study
-    again, and `at_work` names the runs that are computing it now.
+    `understood` are tables that show how the campaign was understood: axes, fixed parameters and outputs. `failures`
+    are failures and warnings, in groups whose messages differ only in their numbers. `not_fitted` are the laws that
+    cannot be fitted and `not_drawn` the figures that cannot be drawn, both with the reasons. The data in `figures` are
+    made by the module `mdr_dask.report.figures`, those in `cases` by `mdr_dask.report.cases`. `rerun` are commands that
+    compute the study again, and `at_work` names the runs that are computing it now.
     """
 
     url: str
@@ -274,7 +275,7 @@ def _law(url: str, name: str, summary: str, result: xr.Dataset) -> Table:
 
 
 def _interval(row: Mapping[Any, Any], name: str) -> str:
-    """Return a constant as text, with the ends of its interval if they are known."""
+    """Return a fitted constant as text, followed by the two ends of its interval if they are known."""
     low, high = (row.get(f"{name}{end}", np.nan) for end in ("_low", "_high"))
     return f"{_cell(row[name])} ({_cell(low)}, {_cell(high)})" if np.isfinite([low, high]).all() else _cell(row[name])
 
@@ -284,7 +285,9 @@ def _cell(value: Any) -> str:
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield a table with the standard errors over realisations and the grid errors of means."""
+    """Yield one table with two errors of the mean of each output: the standard error over realisations, and the grid
+    error.
+    """
     rows = []
     for output in main_outputs(data):
         if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):

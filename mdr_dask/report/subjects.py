@@ -15,8 +15,8 @@ class Equation(NamedTuple):
 class Subject(NamedTuple):
     """The description of the method of a model: a paragraph for a paper, the equations, and the papers to cite.
 
-    `can` and `cannot` are statements that the results support and do not support. `page` is a page of the
-    documentation.
+    `can` lists statements that the results support, `cannot` lists statements that they do not support. `page` is the
+    path of a page of the documentation.
     """
 
     method: str
@@ -73,11 +73,11 @@ _NOT_ROUGH = (
 SUBJECTS: dict[str, Subject] = {
     "sliding_friction": Subject(
         "A viscoelastic body slides steadily over a rigid rough line. The method of dimensionality reduction replaces "
-        "the half-space by independent elements. Every indentation of an element relaxes exponentially. The "
-        "displacement of the element is the largest of its earlier indentations after this relaxation. The line "
-        "consists of cubic pieces, and one pass along the line finds the steady displacements. The indentation depth "
-        "follows from the normal force. The lines are self-affine with random phases, or measured, and the results "
-        "are means over the lines.",
+        "the half-space by independent elements. The displacement that the line imposes on an element decays "
+        "exponentially after the line has moved on. The displacement of an element is the largest of all "
+        "displacements imposed on it so far, each reduced by its decay since then. The line consists of cubic pieces, "
+        "and one pass along the line finds the steady displacements. The indentation depth follows from the normal "
+        "force. The lines are self-affine with random phases, or measured, and the results are means over the lines.",
         (
             Equation(r"f = 4 G \, \mathrm{d}x \, (u + \tau \dot{u}) \geq 0", "force of an element of a Kelvin solid"),
             Equation(

@@ -11,7 +11,7 @@ _INDEX = re.compile(r"([_^])(?:\{([^{}]*)\}|(.))")
 def markup(label: str) -> str:
     """Return a label as HTML: in ``$F_N$``, N becomes a subscript. The only elements are ``sub`` and ``sup``."""
     parts = label.split("$")
-    if len(parts) % 2 == 0:  # one dollar sign has no partner
+    if len(parts) % 2 == 0:  # an odd number of dollar signs is not mathtext
         return escape(label)
     return "".join(_formula(part) if k % 2 else escape(part) for k, part in enumerate(parts))
 
@@ -25,7 +25,9 @@ def _formula(text: str) -> str:
 
 
 def _character(command: re.Match[str]) -> str:
-    """Return the character for a command of mathtext that is also a name of HTML, such as alpha; else the name."""
+    """Return the character for a command of mathtext, such as α for the command ``alpha``. If HTML has no character of
+    this name, the name itself is returned.
+    """
     return unescape(f"&{command[1]};").removeprefix("&").removesuffix(";")
 
 
