@@ -1,7 +1,8 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
-Numba compiles a kernel again only if the file of the kernel has changed. If you change a function that kernels in other
-files call, empty numba's cache or set NUMBA_CACHE_DIR to a new folder. The tests set NUMBA_CACHE_DIR automatically.
+Numba compiles a kernel again only if the file that contains the kernel has changed. If you change a function that is
+called by kernels in other files, empty numba's cache or set NUMBA_CACHE_DIR to a new folder. The tests set
+NUMBA_CACHE_DIR automatically.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def jit(function: Kernel) -> Kernel:
 def jit_uncounted(function: Kernel) -> Kernel:
     """Compile a function that creates no arrays, without reference counting for arrays.
 
-    Reference counting makes functions several times slower that read arrays from named tuples inside loops.
+    With reference counting, functions that read arrays from named tuples inside loops are several times slower.
     """
     return _cached(function, UNCOUNTED)
 
@@ -55,7 +56,11 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Replace errors of the cache by warnings: the kernel is then compiled again, or used without being stored."""
+    """Turn errors of the cache into warnings.
+
+    A kernel that cannot be read from the cache is compiled again. A kernel that cannot be written is used without being
+    stored.
+    """
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:

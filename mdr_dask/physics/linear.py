@@ -26,7 +26,10 @@ class Factors(NamedTuple):
 
 
 def factorise(matrix: FloatArray) -> Factors | None:
-    """Return the factors of a square matrix in C order, which is overwritten; None if it is singular or not finite."""
+    """Return the factors of a square matrix in C order, or None if the matrix is singular or not finite.
+
+    The matrix is overwritten.
+    """
     triangles, pivots, status = dgetrf(matrix.T, overwrite_a=True)
     diagonal = np.diagonal(triangles)
     return Factors(triangles, pivots) if status == 0 and np.all(np.isfinite(diagonal)) else None

@@ -1,4 +1,4 @@
-"""How a solver ended: one enumeration for all solvers, with a sentence for users for each outcome."""
+"""The outcomes of all solvers, such as CONVERGED or SINGULAR, each with a sentence for users."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended; compiled functions return the number of a member."""
+    """How a solver ended; compiled functions return the number, for example 0 for CONVERGED."""
 
     CONVERGED = 0
     DEPTH_NOT_FOUND = 1

@@ -9,7 +9,8 @@ as
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
 116, 405, 1994). The second term is needed because the results on two grids may agree by chance: after the change b, the
-next change should be b / r. The last term e (`Solution.unseen`) is an error that may be the same on two grids.
+next change should be b / r. The last term e (`Solution.unseen`) is for errors that may be the same on two grids and
+then do not show in the difference of the results.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Estimate(NamedTuple):
     error: FloatArray
 
     def scaled(self, factor: float) -> Estimate:
-        """Return the estimate in another unit."""
+        """Return the value and its error, both multiplied by a factor, for example to change the unit."""
         return Estimate(self.value * factor, self.error * factor)
 
 
@@ -43,7 +44,8 @@ class Solution(NamedTuple):
 
     `values` contains one array per output, with one number or one profile per case. NaN in a profile marks positions
     where the output does not exist. `outcome` contains values of `Outcome`. `unseen` is a relative error that is added
-    to the estimate, because it may be the same on two grids: one number, or shape (outputs, cases).
+    to the estimate, because the difference between two grids may not show it. It is one number, or has the shape
+    (outputs, cases).
     """
 
     values: Sequence[FloatArray] | FloatArray
@@ -86,8 +88,8 @@ def refine(
 
     The accuracy of an output is relative to the largest absolute value of the output, or to its floor if the floor is
     larger. With an infinite accuracy, the second level is accepted. `order` is the order of convergence of the dominant
-    part of the error. `requested` is the number of outputs that must meet the accuracy, or None for all outputs. The
-    other outputs come last; their errors are infinite.
+    part of the error. `requested` is the number of outputs that must meet the accuracy, or None for all outputs. These
+    outputs come first. The errors of the other outputs are infinite.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all outputs of
     this case, because one output alone may be the same on two grids by chance. Choose False for outputs that converge
@@ -110,7 +112,8 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change[:requested].max(axis=0, initial=0.0), change.shape)
-        # if a case had no solution on a previous grid, `before` is infinite and the second term is left out
+        # if a case had no solution on an earlier grid, `before` is infinite, and the second term of the maximum is left
+        # out
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
         solved = fine.outcome == Outcome.CONVERGED
@@ -133,7 +136,7 @@ def refine(
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
-    The change of a profile is the largest change divided by the largest value. The change is infinite if a case has no
+    For a profile, the largest change is divided by the largest absolute value. The change is infinite if a case has no
     solution on one of the grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)

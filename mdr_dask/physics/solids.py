@@ -42,7 +42,7 @@ def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
     """Return the standard solid: a spring and one Prony term (Pa, s).
 
-    The moduli are those of very slow and of sudden deformation.
+    `static_modulus` is the modulus for very slow deformation, and `glass_modulus` the modulus for sudden deformation.
     """
     if not glass_modulus >= static_modulus:
         raise ValueError(f"the glass modulus must not be below the static one, got {glass_modulus!r}")
@@ -117,9 +117,10 @@ def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
 class SeriesFit:
     """A Prony series fitted to moduli, and its errors.
 
-    `storage_error` and `loss_error` are root mean squares of the relative errors of G' and of G'', or NaN without data.
-    `largest_error` is the largest relative error of both, at the angular frequency `worst_frequency` (rad/s). `range`
-    is the range of angular frequency of the data.
+    `storage_error` is the root mean square of the relative errors of G', and `loss_error` that of G''; an error is NaN
+    if there are no data for its modulus. `largest_error` is the largest relative error of G' or G''; it occurs at the
+    angular frequency `worst_frequency` in rad/s. `range` contains the lowest and the highest angular frequency of the
+    data.
     """
 
     solid: LinearSolid
@@ -295,10 +296,11 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the decay times lambda_k of free recovery, which are the zeros of 1 + sum weight_m / (tau_m - lambda).
 
-    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. The times are
-    ascending and distinct. Then lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest
-    tau. The second result contains tau_m - lambda_k in row m and column k. These differences are precise even if the
-    times cover many decades, because each lambda_k is computed as a distance from the nearest tau_m.
+    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. The times
+    tau_m must be ascending and distinct. Then lambda_k lies between tau_k and tau_(k+1), and the largest lambda_k lies
+    above the largest tau_m. The second result contains tau_m - lambda_k in row m and column k. These differences are
+    precise even if the times cover many decades, because each lambda_k is computed as a distance from the nearest
+    tau_m.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))

@@ -1,8 +1,9 @@
-"""Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
+"""Where the asperities of two rough lines, separated by a film, break the boundary layer (thesis section 5.2.2).
 
-A cluster is an interval of length D in which the sum ``z`` of the heights exceeds the film ``h0``. It breaks the layer
-if ``int (z - h0) dx > s D^3`` with the layer strength ``s = pi tau0/(12 E* h_c)`` (eqs. 5.5, 5.6). The contact zone is
-a window of given width, placed at every node of the closed lines; lines are cubic splines, whose integrals are exact.
+A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``; D is the length of
+the interval. The cluster breaks the layer if ``int (z - h0) dx > s D^3`` with the layer strength
+``s = pi tau0/(12 E* h_c)`` (eqs. 5.5, 5.6). The contact zone is a window of given width, which is placed at every node.
+The lines are closed: the first node follows the last. They are cubic splines, so the integrals are exact.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
-#: Treatment of a cluster that an edge of the window cuts. ``part``: the part inside the window is tested and counted,
-#: as if nothing existed outside. ``clip``: the whole cluster is tested, but only the part inside the window is counted.
-#: ``whole``: the whole cluster is tested and counted. ``inside``: a cut cluster is ignored.
+#: Treatment of a cluster that continues beyond an edge of the window. ``part``: the part inside the window is tested
+#: and counted, as if the cluster ended at the edge. ``clip``: the whole cluster is tested, but only the part inside the
+#: window is counted. ``whole``: the whole cluster is tested and counted. ``inside``: such a cluster is ignored.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
 #: A spacing is divided into this number of parts. Lengths in contact are counted in whole parts.
@@ -42,10 +43,10 @@ def _counted(length: float) -> int:
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add `number` to `count` entries of the trace, the first of which has the index `begin`.
+    """Add `number` to `count` successive entries of the trace, beginning with the entry `begin`.
 
-    Entry k of the trace is the length in contact in the window that begins at node k of the closed line; `jumps` holds
-    the differences between neighbouring entries.
+    Entry k of the trace is the length in contact in the window that begins at node k. The array `jumps` holds the
+    differences between neighbouring entries of the trace.
     """
     points = jumps.size - 1
     while begin < 0:
@@ -64,15 +65,15 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to the windows that contain only its head or only its tail.
 
-    If `judged`, this part has to break the layer by itself, else the whole cluster has to. A part longer than `reach`
-    cannot break the layer, whatever its shape.
+    If `judged` is True, the part inside the window has to break the layer by itself; otherwise, the whole cluster has
+    to break it. A part longer than `reach` cannot break the layer, whatever its shape.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
     always = total > limit * (end - start) ** 3
     longest = min(window, reach) if judged else window
     width = int(window)
-    beyond = window - width  # from the last node in the window to its right edge
+    beyond = window - width  # distance from the last node in the window to the right edge of the window
     first, second, third, fourth = shares(beyond)
     node = int(start)
     until_node = -integral(piece(overlap, node), start - node)
@@ -138,10 +139,10 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
 
 
 def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
-    """Return the length in intimate contact for the window that begins at each node, in whole parts (see `PARTS`).
+    """Return, for the window that begins at each node, the length in intimate contact in whole parts (see `PARTS`).
 
-    The window is in spacings, at most the length of the line, and `rule` is one of `EDGE_RULES`. The fraction of
-    entries above zero is the breakthrough probability.
+    `window` is the length of the window in spacings; the window must not be longer than the line. `rule` is one of
+    `EDGE_RULES`. The fraction of windows with a length above zero is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -152,8 +153,8 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
 class Pair(NamedTuple):
     """Splines of the heights of two closed lines in m (see `surfaces.splines`), separated by a film.
 
-    `level` is the film h0 in m, `spacing` the distance of nodes in m, and `strength` comes from `layer_strength`, in
-    1/m.
+    `level` is the film h0 in m, `spacing` is the distance between neighbouring nodes in m, and `strength` is the result
+    of `layer_strength` in 1/m.
     """
 
     line_1: FloatArray
@@ -165,7 +166,7 @@ class Pair(NamedTuple):
 
 @jit
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
-    """Write the spline coefficients of the overlap from node p of line 1 and node q of line 2."""
+    """Write the spline coefficients of ``z - h0`` to `overlap`; node p of line 1 faces node q of line 2."""
     points = pair.line_1.size
     for k in range(overlap.size):
         overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
@@ -173,9 +174,10 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Return length and overlap integral of the part of a cluster beyond an edge of the window.
+    """Return the length of a cluster beyond an edge of the window, and the integral of ``z - h0`` over it.
 
-    The cluster is followed to the right if `most` is positive, else to the left, up to the distance ``|most|``.
+    The cluster is followed to the right of the edge if `most` is positive, and to the left if it is negative, up to the
+    distance ``|most|``.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -201,7 +203,7 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window; `work` is workspace for the overlap and its zeros."""
+    """Return the length in intimate contact of one window; `work` is workspace for ``z - h0`` and its zeros."""
     points, pieces = pair.line_1.size, int(np.ceil(window))
     overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
     limit = pair.strength * pair.spacing**2
@@ -239,10 +241,11 @@ def _windows(
 
 
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
-    """Return the length in intimate contact, in whole parts (see `PARTS`), of the windows at any pairs of left nodes.
+    """Return the length in intimate contact of several windows, in whole parts (see `PARTS`).
 
-    Rolling with creep needs this function (see `creep_positions`); for pure rolling, :func:`contact_lengths` is faster.
-    The window is in spacings, and `rule` is one of `EDGE_RULES`.
+    `positions` holds the node of line 1 and the node of line 2 at the left edge of each window. Rolling with creep
+    needs this function (see `creep_positions`); for pure rolling, :func:`contact_lengths` is faster. `window` is the
+    length of a window in spacings, and `rule` is one of `EDGE_RULES`.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
@@ -252,10 +255,10 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the nodes of both lines at the left edge of the window after distances of travel in spacings.
+    """Return the nodes of line 1 and of line 2 nearest to the left edge of the window after each `travel`.
 
-    The travel is at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``, the lines move by ``1 + S/2``
-    and ``1 - S/2`` times the travel.
+    `travel` is a distance in spacings, covered at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``,
+    line 1 moves by ``1 + S/2`` times the travel, and line 2 by ``1 - S/2`` times the travel.
     """
     steps = np.asarray(travel, dtype=np.float64)
     first, second = (np.round(steps * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))

@@ -1,4 +1,4 @@
-"""Clusters: connected intervals of a closed line in which the sum of heights exceeds the film."""
+"""Clusters: intervals of a closed line in which the summed heights of two rough lines exceed the film."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 class Clusters(NamedTuple):
     """The clusters of a closed line, in the order in which they begin; lengths are in spacings of the nodes.
 
-    If a cluster continues from the last node to the first, its `end` lies beyond the last node. `total` is the integral
-    of ``z - h0`` over each cluster in m. `overlap`, shape (points + 3,), is the spline of ``z - h0`` in m: the last
-    coefficient, all coefficients, and the first two. A cluster breaks the layer if ``total > limit (end - start)^3``
-    (thesis eq. 5.6), with `limit` in m. `closed` means that a single cluster covers the whole line.
+    If a cluster continues from the last node to the first, its `end` lies beyond the last node: on a line of 100 nodes,
+    a cluster from position 98 to position 3 ends at 103. `total` is the integral of ``z - h0`` over each cluster in m.
+    `overlap`, shape (points + 3,), contains the spline coefficients of ``z - h0`` in m: first the last coefficient of
+    the line, then all coefficients, then the first two again. A cluster breaks the layer if
+    ``total > limit (end - start)^3`` (thesis eq. 5.6), with `limit` in m. `closed` means that a single cluster covers
+    the whole line.
     """
 
     start: FloatArray
@@ -55,7 +57,7 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
 
 @jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
-    """Write the positions where a spline changes sign to `found`, and return their number."""
+    """Write the positions at which a spline changes sign to `found`, and return the number of these positions."""
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):
@@ -74,9 +76,10 @@ def _totals(overlap: FloatArray, start: FloatArray, end: FloatArray) -> FloatArr
 
 
 def find_clusters(line: FloatArray, level: float, spacing: float, strength: float) -> Clusters:
-    """Return the clusters of the spline of the summed heights in m (at least three nodes), for the film `level` in m.
+    """Return the clusters of a line for the film `level` in m.
 
-    `spacing` is the distance of nodes in m, and `strength` comes from `layer_strength`, in 1/m.
+    `line` contains the spline coefficients of the summed heights in m, at three nodes or more. `spacing` is the
+    distance between neighbouring nodes in m, and `strength` is the result of `layer_strength` in 1/m.
     """
     points = line.size
     overlap = np.concatenate((line[-1:], line, line[:2])) - level

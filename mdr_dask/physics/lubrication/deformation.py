@@ -1,4 +1,4 @@
-"""Elastic deformation of a half-plane under a piecewise linear pressure on any grid, integrated exactly.
+"""Elastic deformation of a half-plane under a piecewise linear pressure; the integrals are exact on any grid.
 
 Hertz units: positions in half widths a, pressures in p0, films and deformations in ``a^2/R`` (thesis eq. B.13, B.19).
 """
@@ -22,9 +22,10 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Replace second integrals of ``ln|x|`` at the nodes by the integral of ``ln|x|`` times each hat function.
+    """Replace the entries of `row`, second integrals of ``ln|x|``, by integrals of ``ln|x|`` times a hat function.
 
-    A hat function is 1 at its node, 0 at all others, and linear in between. The entries of both end nodes become zero.
+    The hat function of a node is 1 at this node, 0 at all other nodes, and linear in between. The entries of the first
+    and the last node become zero.
     """
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
@@ -38,7 +39,7 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``; the end entries are 0."""
+    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``; first and last are 0."""
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)
@@ -46,15 +47,16 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix D, shape (n, n), with ``delta_i - delta(0) = sum_j D_ij P_j``; both end pressures are zero.
+    """Return the matrix D, shape (n, n), with ``delta_i - delta(0) = sum_j D_ij P_j``.
 
-    The deformation is ``-(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
+    The first and the last pressure must be zero. The deformation relative to that at ``X = 0`` is
+    ``-(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
     """
     n = nodes.size
     matrix, origin = np.empty((n, n)), np.empty(n)
     _influence_row(0.0, nodes, origin)
     for i in range(n):
-        for j in range(i + 1):  # the matrix is symmetric: one logarithm for two entries
+        for j in range(i + 1):  # the matrix is symmetric, so one logarithm gives two entries
             matrix[i, j] = matrix[j, i] = _second_integral(nodes[i] - nodes[j])
     for i in range(n):
         row = matrix[i]
@@ -68,7 +70,7 @@ def influence_matrix(nodes: FloatArray) -> FloatArray:
 def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_film: float) -> FloatArray:
     """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points X (thesis eq. B.19).
 
-    The first and the last pressure are zero.
+    The first and the last pressure must be zero.
     """
     origin, row = np.empty(nodes.size), np.empty(nodes.size)
     _influence_row(0.0, nodes, origin)

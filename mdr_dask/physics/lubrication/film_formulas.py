@@ -1,7 +1,7 @@
-"""Film thickness of a lubricated line contact in closed form: Hertz contact, regressions, regimes and limiting films.
+"""Closed formulas for a lubricated line contact: Hertz contact, film thickness, and lubrication regimes.
 
 The velocity is the mean ``u = (u1 + u2)/2``, and films are given as ``h/R`` (thesis section 5.2.1 and appendix B). The
-groups are ``W = F/(L' E' R)``, ``U = eta0 u/(E' R)`` and ``G = alpha E'``, with ``E' = 2 E*``.
+dimensionless groups are ``W = F/(L' E' R)``, ``U = eta0 u/(E' R)`` and ``G = alpha E'``, with ``E' = 2 E*``.
 """
 
 from __future__ import annotations
@@ -44,7 +44,10 @@ def hertz_line(line_load: ArrayLike, E_star: ArrayLike, radius: ArrayLike) -> He
 
 
 def hertz_gap(x: ArrayLike, half_width: float, radius: float) -> FloatArray:
-    """Return the gap in m between the bodies of a dry line contact at distances x (m) from its centre; 0 in contact."""
+    """Return the gap in m between the bodies of a dry line contact; inside the contact it is 0.
+
+    `x` contains distances from the centre of the contact in m.
+    """
     ratio = np.maximum(1.0, np.abs(np.asarray(x, dtype=np.float64)) / half_width)
     root = np.sqrt(ratio**2 - 1)
     return np.asarray(half_width**2 / (2 * radius) * (ratio * root - np.log(ratio + root)))
@@ -61,9 +64,9 @@ def fluid_friction(
     """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
 
     `log_viscosity` returns ln of the viscosity in Pa s at pressures in Pa; all other arguments are in SI units. The
-    sliding velocity is not zero. The shear stress is ``tau_E asinh(eta v/(h tau_E))``, so a large `eyring_stress` means
-    a Newtonian liquid. `film_share` is the fraction of the load, and of the pressure, that the film carries. Rolling
-    friction is not included.
+    sliding velocity must not be zero. The shear stress is ``tau_E asinh(eta v/(h tau_E))``, so the liquid is Newtonian
+    if `eyring_stress` is very large. `film_share` is the fraction of the load, and of the pressure, that the film
+    carries. Rolling friction is not included.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
@@ -131,7 +134,10 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material``, and the `ranges` of W, U and G of the fitted data."""
+    """A regression ``h/R = factor W^load U^speed G^material``.
+
+    The fitted data lie in the `ranges` of W, U and G.
+    """
 
     name: str
     factor: float
@@ -150,7 +156,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Return a message that names which of W, U and G lie outside the fitted ranges, or an empty string."""
+        """Return a message about those of W, U and G that lie outside the fitted ranges; empty if all lie inside."""
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
             for symbol, value, (low, high) in zip("WUG", (W, U, G), self.ranges, strict=True)
@@ -210,9 +216,9 @@ ELASTIC_ISOVISCOUS = 2.05
 
 
 def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
-    """Return the minimum film ``h/R`` of the four limiting regimes, shape (4, ...), in the order of `REGIMES`.
+    """Return the minimum film ``h/R`` in each of the four limiting regimes, shape (4, ...), in the order of `REGIMES`.
 
-    As in Johnson's map of the regimes, the last film is that of Dowson and Higginson.
+    The elastic piezoviscous film is that of Dowson and Higginson, as in Johnson's map of the regimes.
     """
     W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
     M = moes_parameters(W, U, G).M
@@ -227,7 +233,7 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
 
 
 def expected_film(M: float, L: float) -> float:
-    """Return a first guess of the film in units of ``a^2/R`` from the four limiting regimes."""
+    """Return a first guess of the film in units of ``a^2/R``, taken from the films of the four limiting regimes."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 
@@ -235,9 +241,9 @@ def expected_film(M: float, L: float) -> float:
 def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the regime of each case as an index of `REGIMES`.
 
-    Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
-    thicker and the piezoviscous film the thinner of its two limits, and the thicker of both films determines the
-    regime.
+    Elastic flattening makes an isoviscous film thicker, so the isoviscous film is the larger of the rigid and the
+    elastic limit. It makes a piezoviscous film thinner, so the piezoviscous film is the smaller of its two limits. The
+    regime is that of the thicker of these two films.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

@@ -14,7 +14,8 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.deformation import film as film_at
 from mdr_dask.physics.lubrication.grids import adapted_density
 
-#: A second pressure maximum is a spike if it exceeds the minimum before it by this fraction of the maximum pressure.
+#: A second pressure maximum is a spike if it exceeds the pressure minimum between the two maxima by this fraction of
+#: the maximum pressure.
 _SPIKE = 0.01
 #: Number of nodes on either side of a position, through which the interpolating polynomial passes.
 _CUBIC, _QUINTIC = 2, 3
@@ -26,9 +27,9 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``, and `spacing` is the distance between two nodes times the density of nodes. The
-    numerical method takes the pressure as linear between nodes. This makes the film slightly too thin there, so
-    :meth:`film_between` interpolates the nodal films.
+    `central` is the film at ``X = 0``. `spacing` is the distance between two neighbouring nodes times the density of
+    nodes at this place; the product is the same everywhere on the grid. The film that belongs to a piecewise linear
+    pressure is slightly too thin between the nodes, so :meth:`film_between` interpolates the films at the nodes.
     """
 
     nodes: FloatArray
@@ -50,10 +51,10 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at the nodes of another grid, with its front (see :attr:`front`) moved to `front`.
+        """Return the pressure at the nodes of another grid, shifted so that its :attr:`front` lies at `front`.
 
-        The two nodes next to the new front get the pressures that this grid has half a cell before and behind its own
-        front, because these pressures are nearly the same on a finer grid.
+        The node before the new front gets the pressure half a cell before the old front, and the node behind the new
+        front the pressure half a cell behind the old front. These two pressures are nearly the same on a finer grid.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -65,7 +66,7 @@ class GridSolution:
 
     @cached_property
     def density(self) -> FloatArray:
-        """The density of nodes that is suitable for this solution, at its nodes."""
+        """The density that the nodes should have for this solution, evaluated at the nodes."""
         return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property
@@ -75,7 +76,7 @@ class GridSolution:
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and height of the minimum film, interpolated around the lowest node.
+        """Position and value of the minimum film, interpolated around the node with the thinnest film.
 
         The polynomial is of fifth order, because the interpolation error of a cubic would exceed the other errors.
         """
@@ -90,22 +91,25 @@ class GridSolution:
 
     @cached_property
     def spike(self) -> tuple[float, float]:
-        """Position and height of a second pressure maximum, downstream of the first; both NaN if there is none."""
+        """Position and pressure of a second pressure maximum, downstream of the first; both NaN if there is none."""
         peak, _ = self._spike
         return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
 
     @property
     def resolves_spike(self) -> bool:
-        """Whether the pressure behind the spike needs at least two cells to fall by half of the height of the spike."""
+        """Whether the pressure needs at least two cells behind the spike to fall by half of the height of the spike.
+
+        The height is counted from the pressure minimum before the spike.
+        """
         peak, lowest = self._spike
         behind = self.pressure[peak:]
         return peak > 0 and int(np.argmax(behind <= 0.5 * (lowest + behind[0]))) > 1
 
     @cached_property
     def front(self) -> float:
-        """Position at which the pressure behind the spike equals the minimum before it; NaN if there is no spike.
+        """Position behind the spike at which the pressure equals the minimum before the spike; NaN without a spike.
 
-        Unlike the height of the spike, this position hardly depends on the nodes.
+        Unlike the pressure of the spike, this position hardly depends on where the nodes lie.
         """
         peak, lowest = self._spike
         if not peak:
@@ -115,7 +119,11 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """The node of the spike (0 if there is none), and the lowest pressure between it and the maximum before it."""
+        """The index of the node of the spike, and the lowest pressure between the spike and the maximum before the
+        spike.
+
+        Both are 0 if there is no spike.
+        """
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
@@ -125,7 +133,10 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Position where the film ends, extrapolated from the last four pressures, which tend to zero quadratically."""
+        """Position where the film ends, extrapolated from the last four positive pressures.
+
+        The pressure tends to zero quadratically there.
+        """
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
         x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
@@ -137,7 +148,7 @@ class GridSolution:
 
 
 def cell_around(nodes: FloatArray, position: float) -> FloatArray:
-    """Return the two nodes on either side of a position."""
+    """Return the last node before a position and the first node behind it."""
     after = int(np.clip(np.searchsorted(nodes, position), 1, nodes.size - 1))
     return nodes[after - 1 : after + 1]
 
@@ -145,9 +156,10 @@ def cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return the expected value on a grid of another spacing of a quantity that `reading` evaluates on one grid.
+    """Return the value of a quantity that is expected on a grid with another spacing.
 
-    From two grids or more, the value is extrapolated with an error of second order in the spacing.
+    `reading` evaluates the quantity on one grid. If there are at least two solutions, the value is extrapolated from
+    the last two; the error of the quantity is taken as proportional to the square of the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:
@@ -158,7 +170,7 @@ def expected(
 
 @jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
-    """Interpolate at each position by the polynomial through the `sides` nodes on either side of this position."""
+    """Interpolate at each position by the polynomial through `sides` nodes before and `sides` nodes behind it."""
     result = np.empty(positions.size)
     for k in range(positions.size):
         low, high = sides, nodes.size - sides  # bisection for the first node at or behind the position

@@ -1,7 +1,7 @@
 """Graded grids for a lubricated line contact; positions are in half widths, films in ``a^2/R``.
 
-A grid is sampled from a density of nodes along the contact. Grids with different numbers of nodes are therefore
-similar, as Richardson extrapolation requires.
+The nodes are placed according to a given density of nodes along the contact. Two grids with the same density but
+different numbers of nodes are therefore geometrically similar, as Richardson extrapolation requires.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def inlet_position(central_film: float) -> float:
 
 
 def outlet_position(central_film: float) -> float:
-    """Return a position behind the rupture of the film, in half widths."""
+    """Return a position downstream of the point where the film ends, in half widths."""
     return 1.1 + float(np.sqrt(2 * central_film))
 
 
@@ -52,10 +52,10 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float
 ) -> tuple[FloatArray, float]:
-    """Return about `count` nodes with a given density, and the distance between nodes times the density.
+    """Return about `count` nodes with a given density, and the product of their distance and the density.
 
-    The film ends at a node on every grid, so that errors on different grids can be compared. At the front, the fall of
-    the pressure behind a spike (NaN if there is none), the pressure changes within one or two cells. So the cells are
+    The film ends at a node on every grid, so that errors on different grids can be compared. `front` is the position
+    behind a spike at which the pressure falls within one or two cells; it is NaN if there is no spike. The cells are
     made slightly wider or narrower until the front lies near the middle of a cell.
     """
     number = _cells(positions, density)
@@ -73,13 +73,16 @@ def _halved_by(share: float, cells: int) -> int:
 
     `share` is the number of cells before the front, divided by the number of cells before the end of the film.
     """
-    far = int(0.5 / max(1 - share, 4 / cells))  # n * share % 1 repeats if n grows by 1 / (1 - share)
+    far = int(0.5 / max(1 - share, 4 / cells))  # the fraction of n * share repeats if n grows by 1 / (1 - share)
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
-    """Return the number of cells before a position; `number` is that before each of the `positions`."""
+    """Return the number of cells before a position.
+
+    `number` contains the number of cells before each of the `positions`.
+    """
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]
     slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
@@ -108,14 +111,17 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 
 
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return a first guess of the pressure: Hertz' ellipse, or a wider one further upstream for a thick film."""
+    """Return a first guess of the pressure: Hertz' ellipse, or, for a thick film, a wider ellipse further upstream."""
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second derivative at the nodes from divided differences; at both ends, that of the neighbour."""
+    """Return the second derivative at the nodes from divided differences.
+
+    The first and the last node get the value of their neighbour.
+    """
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])
@@ -124,9 +130,10 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
     """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    The flow, with an error of second order, needs ``sqrt(|H''|/H)``, and the deformation, with an error of third order,
-    the cube root of ``|P''|``. A least density provides nodes in the contact and in the inlet. Smoothing makes
-    neighbouring cells similar.
+    The density is a sum of three terms. The flow, whose discretisation error is of second order, needs a density of
+    ``sqrt(|H''|/H)``. The deformation, whose error is of third order, needs a density proportional to the cube root of
+    ``|P''|``. A minimum density provides nodes in the contact and in the inlet. Finally, the sum is smoothed, so that
+    neighbouring cells have similar widths.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

@@ -1,8 +1,9 @@
 """The elastohydrodynamic film of a line contact, in all regimes from rigid isoviscous to elastic piezoviscous.
 
 Hertz units are ``X = x/a``, ``P = p/p0`` and ``H = h R/a^2`` (thesis eq. B.13). With ``E' = 2 E*``, they follow from
-``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. The first solutions of a case give the density of nodes for grids
-of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third order in the spacing.
+``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. The first solutions of a case determine the density of nodes for
+all following grids of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third order in the
+spacing.
 """
 
 from __future__ import annotations
@@ -25,20 +26,25 @@ from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
 
 #: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
-#: Order of convergence of the values extrapolated from two grids. Their error is `FACTOR` times the last change, or
-#: times an eighth of the change before if this is larger (see `refine`).
+#: Order of convergence of the values extrapolated from two grids. The error of such a value is estimated as `FACTOR`
+#: times its change from the previous grid, or `FACTOR` times an eighth of the change before that, if this is larger
+#: (see `refine`).
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Number of nodes of the two grids whose solutions only give the density of nodes for the grids of `NODES`.
+#: Number of nodes of two preliminary grids. Their solutions only determine the density of nodes for the grids of
+#: `NODES`.
 ADAPTED_NODES = 161
-#: Attempts at the first solution: factor of the expected film, largest film over the square of the inlet position,
-#: number of nodes, and step limits of Newton's method. The second attempt is slow but hardly ever fails.
+#: Settings of the attempts at the first solution: the factor by which the expected film is multiplied; the largest
+#: guess of the film, divided by the square of the inlet position; the number of nodes; and the limits of Newton's
+#: method. The second attempt is slow but hardly ever fails.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Step limits on further grids: from an extrapolated guess, and, if that fails, from the solution on the previous grid.
+#: Limits of Newton's method on all further grids. The first pair of limits is for a guess extrapolated from earlier
+#: grids. If this attempt fails, the second pair is for a guess that equals the solution on the previous grid.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
 #: The stated error of a position is never smaller than this number of cells.
 PLACED = 0.1
-#: The stated error of a profile at a position is the largest error within this number of cells of the coarser grid.
+#: The stated error of a profile at a position is the largest error within this distance of the position, in cells of
+#: the second finest grid.
 REACH = 2.0
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
@@ -49,9 +55,10 @@ Reading = Callable[[GridSolution], float | FloatArray]
 class LineContact(NamedTuple):
     """A case in dimensionless numbers: Moes' numbers `M` and `L`, and the laws of the liquid.
 
-    `pole` is Roelands' pressure p_r divided by p0, and `exponent` his z; both are zero for Barus' law. The density
-    constants are multiplied by p0, and zero for an incompressible liquid. `inlet` is where the oil begins, in half
-    widths (negative); None for a fully flooded inlet.
+    `pole` is the pressure p_r of Roelands' law divided by p0, and `exponent` is its exponent z; both are zero for
+    Barus' law. `density_rise` and `density_saturation` are the constants of the density law times p0; both are zero for
+    an incompressible liquid. `inlet` is the position where the oil begins, in half widths (negative), or None for a
+    fully flooded inlet.
     """
 
     M: float
@@ -90,8 +97,8 @@ def line_contact(
     groups : tuple of float
         Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
     E_star : float
-        Contact modulus in Pa. `E_star` and W give p0, with which the density law and Roelands' law are made
-        dimensionless.
+        Contact modulus in Pa. The maximum pressure p0, which follows from `E_star` and W, makes the density law and
+        Roelands' law dimensionless.
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional
@@ -99,7 +106,7 @@ def line_contact(
     compressible : bool
         Whether the density follows the law of Dowson and Higginson.
     inlet : float, optional
-        Beginning of the oil in half widths, negative; None for a fully flooded inlet.
+        Position where the oil begins, in half widths (negative), or None for a fully flooded inlet.
 
     Raises
     ------
@@ -129,7 +136,7 @@ def line_contact(
 
 @dataclass(frozen=True)
 class LineSolution:
-    """The film of a line contact in Hertz units; if there is none, `outcome` and `reason` say why.
+    """The film of a line contact in Hertz units; if no film was found, `outcome` and `reason` give the cause.
 
     `grids` are the solutions on all grids, the finest last. `central_film` and `minimum_film` are in units of
     ``a^2/R``. Without a film, `grids` is empty and both films are NaN.
@@ -153,15 +160,15 @@ class LineSolution:
         return float(max(film.error / film.value for film in (self.central_film, self.minimum_film)))
 
     def estimate(self, reading: Reading) -> Estimate:
-        """Return a quantity, such as a traction, with its error; `reading` evaluates the quantity on one grid."""
+        """Return a quantity, such as a traction coefficient, with its error; `reading` evaluates it on one grid."""
         values = [_extrapolated(reading, *pair) for pair in _pairs(self.grids)]
         return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
     def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
         """Return a profile at ascending positions in half widths; `read` evaluates it on one grid.
 
-        The error at a position is the largest one within `REACH` cells, because profiles of two grids intersect, and
-        their spikes and fronts lie at different positions.
+        The error at a position is the largest estimate within `REACH` cells, because an estimate vanishes where the
+        profiles of two grids intersect, and because their spikes and fronts lie at different positions.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -175,7 +182,7 @@ class LineSolution:
         return Estimate(value, np.where(np.isnan(value), np.nan, largest))
 
     def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths, whose stated error is at least `PLACED` cells."""
+        """Return a position in half widths; its stated error is never smaller than `PLACED` cells."""
         found = self.estimate(reading)
         before, after = cell_around(self.finest.nodes, float(found.value))
         return found._replace(error=np.maximum(found.error, PLACED * (after - before)))
@@ -183,8 +190,8 @@ class LineSolution:
     def spike(self) -> tuple[Estimate, Estimate]:
         """Return position (in half widths) and pressure (in p0) of the spike; NaN if there is no spike.
 
-        The values are those on the finest grid. If the pressure behind the spike falls within one cell, the height of
-        the spike depends on the nodes, and its error is infinite.
+        The values are those on the finest grid. If the pressure behind the spike falls within one cell, the pressure of
+        the spike depends on where the nodes lie, so its stated error is infinite.
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
@@ -201,7 +208,7 @@ class LineSolution:
 
 
 def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
-    """Return the last three pairs (or fewer) of a grid and the next finer grid."""
+    """Return pairs of a grid and the next finer grid: the last three pairs, or all if there are fewer."""
     return list(itertools.pairwise(solved))[-3:]
 
 
@@ -212,7 +219,7 @@ def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) ->
 
 
 def _error(values: Sequence[FloatArray]) -> FloatArray:
-    """Return the estimated error of the last of several extrapolated values, by the rule of `refine`."""
+    """Return the estimated error of the last extrapolated value, by the rule described in `refine`."""
     if len(values) < 2:
         return np.full_like(values[-1], np.inf)
     changes = np.abs(np.diff(values[-3:], axis=0))
@@ -289,8 +296,8 @@ def solve_film(
     Returns
     -------
     LineSolution
-        If no film was found, `outcome` and `reason` say why. The `error` may exceed the accuracy if the finest grid is
-        reached, or if Newton's method fails on finer grids.
+        If no film was found, `outcome` and `reason` give the cause. The `error` may exceed the accuracy if the finest
+        grid is reached, or if Newton's method fails on finer grids.
 
     Examples
     --------
@@ -303,7 +310,7 @@ def solve_film(
     if outcome != Outcome.CONVERGED:
         return _no_solution(case, outcome, source)
     solved: list[GridSolution] = []
-    # both films get the larger of the two relative errors, because two grids may agree on one film by chance
+    # central and minimum film get the larger of their relative errors, as two grids may agree on one film by chance
     scales = np.array([source.central_film, source.minimum[1]])
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
 

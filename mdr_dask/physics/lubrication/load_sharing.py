@@ -1,9 +1,9 @@
 """Load of a rough contact, shared between film and asperities (Johnson, Greenwood and Poon, Wear 19, 91, 1972).
 
-The film carries the fraction gamma of the load. The total pressure deforms the rollers, so the film follows from the
-load and the modulus both multiplied by gamma: W stays the same, U becomes ``U/gamma`` and G becomes ``gamma G``. The
-asperities are springs of the MDR of stiffness ``E* dx``; a line as long as its longest wave represents a square with
-edges of the same length.
+The film carries the fraction gamma of the load. The rollers are deformed by the whole load, not only by the pressure of
+the film. The film is therefore that of a smooth contact in which load and modulus are both multiplied by gamma: W stays
+the same, U becomes ``U/gamma`` and G becomes ``gamma G``. The asperities of a line are springs of the MDR with the
+stiffness ``E* dx``. A line as long as its longest wavelength represents a square area with edges of this length.
 """
 
 from __future__ import annotations
@@ -14,25 +14,29 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-#: Load share of the asperities that is neglected; the relative error of the film is then a quarter of it or less.
+#: If the asperities carry less than this share of the load, they are neglected. The relative error of the film is then
+#: at most a quarter of this share.
 _NEGLIGIBLE = 1e-9
 #: Natural logarithm of the smallest load share of the film that is tried.
 _LEAST_LOGARITHM = -256.0
 #: The film is accepted if the load shares add up to one within the tolerance times this factor.
 _BALANCE = 100.0
-#: Distances between the means of two lines, in rms heights: at the first, the mean gap is zero in double precision,
-#: beyond the second, the overlap is.
+#: Distances between the mean heights of two lines, in rms heights. At `_CLOSED`, the mean gap is about 1e-301. Beyond
+#: `_APART`, the mean overlap is less than the rounding error of the distance.
 _CLOSED = -37.0
 _APART = 9.0
 
 
 def mean_overlap(distance: float) -> float:
-    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z at the distance d of the means, in rms heights."""
+    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z, in rms heights.
+
+    The mean heights of both lines are the distance d apart.
+    """
     return max(exp(-(distance**2) / 2) / sqrt(2 * pi) - distance * erfc(distance / sqrt(2)) / 2, 0.0)
 
 
 def distance_of_means(gap: float) -> float:
-    """Return the distance d of the means at which the mean gap ``<(d - z)+>`` equals `gap`, in rms heights."""
+    """Return the distance d between the mean heights at which the mean gap ``<(d - z)+>`` is `gap`, in rms heights."""
     if gap > _APART:
         return gap
     if mean_overlap(-_CLOSED) >= gap:
@@ -42,16 +46,20 @@ def distance_of_means(gap: float) -> float:
 
 
 class Asperities(NamedTuple):
-    """Two rough lines as springs: rms of the summed heights in m, longest wavelength in m, contact modulus in Pa."""
+    """The asperities of two rough lines.
+
+    `rms` is that of the summed heights in m, `wavelength` the longest wavelength in m, and `E_star` the contact modulus
+    in Pa.
+    """
 
     rms: float
     wavelength: float
     E_star: float
 
     def pressure(self, film: float) -> float:
-        """Return the mean pressure in Pa at a film in m: ``E*/wavelength`` times the mean overlap.
+        """Return the mean pressure in Pa for a film in m: ``E*/wavelength`` times the mean overlap.
 
-        The film is the mean gap.
+        The film is taken as the mean gap between the lines.
         """
         return self.E_star * self.rms / self.wavelength * mean_overlap(distance_of_means(film / self.rms))
 
@@ -69,9 +77,11 @@ def share_load(
 ) -> SharedLoad:
     """Return the film for which the load shares of film and asperities add up to one.
 
-    `film_at` returns the film for a load share of the film. It falls with the share, and may return 0 for a film too
-    thin to be computed. `asperity_share` falls with the film. `tolerance` is the relative error of the load share of
-    the film; that of the film is about a quarter of it. If there is no such film, film and film share are 0.
+    `film_at` returns the film that carries a given load share. This film becomes thinner as the share rises; it may be
+    0 if it is too thin to be computed. `asperity_share` returns the load share of the asperities, which falls as the
+    film becomes thicker. `tolerance` is the allowed relative error of the load share of the film; the relative error of
+    the film is about a quarter of `tolerance`. If there is no such film, the asperities carry the whole load, and film
+    and film share are 0.
     """
 
     def excess(logarithm: float) -> float:
@@ -90,5 +100,5 @@ def share_load(
     film = film_at(share)
     carried = asperity_share(film)
     if abs(carried + share - 1.0) > _BALANCE * tolerance:
-        return SharedLoad(0.0, 0.0, 1.0)  # the root is a jump of `film_at` to 0, where the load is not in balance
+        return SharedLoad(0.0, 0.0, 1.0)  # `film_at` jumps to 0 at this share, and the load is not in balance
     return SharedLoad(film, share, min(carried, 1.0))

@@ -2,8 +2,8 @@
 
 The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), in finite
 volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0`` for the pressure P and the flow
-balance R of each volume. The unknowns are the nodal pressures and the film at ``X = 0``, which follows from the load,
-``int P dX = pi/2``.
+balance R of each volume. The unknowns are the pressures at the nodes and the film at ``X = 0``. The additional equation
+for this film is that of the load, ``int P dX = pi/2``.
 """
 
 from __future__ import annotations
@@ -20,21 +20,23 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-#: Weight of the quadratic (QUICK) face value in the upwind Couette flux; the rest is extrapolated linearly.
+#: In the upwind Couette flux, the value at a face is a weighted mean of a quadratic interpolation (QUICK), with this
+#: weight, and of a linear extrapolation from upstream.
 _QUADRATIC = 1.0 / 3.0
 #: One step may reduce the film at a node by at most this fraction of the film.
 _FILM_SHARE = 0.8
-#: If a step would have to be shortened to this fraction or less, the film counts as collapsed.
+#: If only this fraction of a step or less is allowed, the film counts as collapsed.
 _LEAST_SHARE = 1e-9
 #: The factorised Jacobian is reused if the last step was smaller than this fraction of the step before.
 _SHRINKS = 0.1
 #: The iteration ends after a step whose relative size is below this value. The remaining error is about the square of
-#: the size, or more if the Jacobian was reused; the size must then be a hundred times smaller.
+#: this size. After a step with a reused Jacobian, the remaining error is larger, so the size must be a hundred times
+#: smaller.
 _TOLERANCE = 1e-4
 
 
 class Grid(NamedTuple):
-    """Nodes in half widths, their trapezoidal weights, and the matrix `deformation.influence_matrix`."""
+    """Nodes in half widths, their weights in the trapezoidal rule, and the result of `influence_matrix`."""
 
     nodes: FloatArray
     weights: FloatArray
@@ -42,7 +44,7 @@ class Grid(NamedTuple):
 
     @classmethod
     def of(cls, nodes: FloatArray) -> Grid:
-        """Return the grid of ascending nodes."""
+        """Return the grid with the given nodes, which must be ascending."""
         weights = np.zeros_like(nodes)
         weights[:-1] += np.diff(nodes) / 2
         weights[1:] += np.diff(nodes) / 2
@@ -52,8 +54,8 @@ class Grid(NamedTuple):
 class Pace(NamedTuple):
     """Limits of an iteration.
 
-    `clip` is the largest change of a pressure in one step divided by the largest pressure, and `most` the largest
-    number of steps.
+    `clip` is the largest allowed change of any pressure in one step, divided by the largest pressure. `most` is the
+    largest allowed number of steps.
     """
 
     clip: float
@@ -72,8 +74,9 @@ class Iterate(NamedTuple):
 class Liquid(NamedTuple):
     """Viscosity and density as functions of pressure, in Hertz units.
 
-    `alpha` is the slope of ``ln eta`` at ambient pressure, ``alpha p0``. `pole` is Roelands' p_r divided by p0, and
-    `exponent` his z, which is zero for Barus' law. The density is ``rho/rho0 = 1 + rise P/(1 + saturation P)``.
+    `alpha` is the pressure-viscosity coefficient times p0. `pole` is the pressure p_r of Roelands' law divided by p0,
+    and `exponent` is its exponent z; `exponent` is zero for Barus' law. The density is
+    ``rho/rho0 = 1 + rise P/(1 + saturation P)``.
     """
 
     alpha: float
@@ -85,7 +88,7 @@ class Liquid(NamedTuple):
 
 @jit
 def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
-    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in p0, by Barus' law or, if z > 0, Roelands' law."""
+    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in p0: Barus' law, or Roelands' law if z > 0."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
     ratio = 1.0 + P / liquid.pole
@@ -104,9 +107,9 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
 
 @jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
-    """Return the mean of 1/eta between two nodes, and its derivatives by `left` and `right`, the values of ln(eta).
+    """Return the mean of 1/eta between two nodes, and its derivatives with respect to `left` and `right`.
 
-    The mean is exact if ln(eta) is linear between the nodes.
+    `left` and `right` are the values of ln(eta) at the two nodes. The mean is exact if ln(eta) is linear between them.
     """
     rise = right - left
     if abs(rise) < 1e-3:
@@ -122,7 +125,10 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 
 @jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of the nodes f-1, f, f+1 in the value at the face between f and f+1, for a flow to f+1."""
+    """Return the weights of the values at the nodes f-1, f and f+1 in the value at the face between f and f+1.
+
+    The liquid flows from node f to node f+1.
+    """
     if f == 0:
         return 0.0, 0.5, 0.5
     dx = nodes[f + 1] - nodes[f]
@@ -136,9 +142,9 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 
 
 class Imbalance(NamedTuple):
-    """Inflow minus outflow of every volume, shape (n,), and its derivatives by pressure and film, shape (n, 4).
+    """Inflow minus outflow of every volume, shape (n,), and the derivatives of this difference, shape (n, 4).
 
-    Row i contains the derivatives by pressure and film at the four nodes from i - 2 to i + 1.
+    Row i contains the derivatives with respect to the pressure, or to the film, at the four nodes from i - 2 to i + 1.
     """
 
     value: FloatArray
@@ -195,7 +201,10 @@ def balance(
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
-    """Write the derivatives of the imbalance of volume i by all pressures, which also change the film, to `row`."""
+    """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`.
+
+    They include the effect of the pressures on the film.
+    """
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
@@ -255,7 +264,10 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Write the right side for a step with a reused Jacobian; the pressures at inactive nodes are zero already."""
+    """Write the right side of the equations for a step with a reused Jacobian to `b`.
+
+    The pressures at all inactive nodes must be zero.
+    """
     for k in range(active.size):
         b[k] = -R[active[k]]
     b[active.size] = 0.5 * np.pi
@@ -265,7 +277,7 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 @jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
-    """Add the deformation under the pressures P to the film H; four rows at a time are summed in parallel."""
+    """Add the deformation under the pressures P to the film H; four rows are summed at the same time."""
     n = P.size
     for i in range(0, n - 3, 4):
         h0, h1, h2, h3 = H[i], H[i + 1], H[i + 2], H[i + 3]
@@ -328,8 +340,8 @@ def _take_step(
 def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
     """Solve for pressure and film on one grid; the outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
 
-    The guessed pressure is zero at both ends and nowhere negative. The guessed central film is so large that the film
-    is positive at all nodes.
+    The guessed pressure must be zero at both ends and nowhere negative. The guessed central film must be so large that
+    the film is positive at all nodes.
     """
     n = guess.size
     P, H = guess.copy(), film_on(grid, guess, central)

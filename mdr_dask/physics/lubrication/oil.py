@@ -1,4 +1,4 @@
-"""Lubricating oils: viscosity versus temperature and pressure, density, pressure-viscosity correlations.
+"""Lubricating oils: viscosity as a function of temperature and pressure, density, and pressure-viscosity coefficient.
 
 Temperatures in K, pressures in Pa, dynamic viscosities in Pa s, kinematic viscosities in m^2/s.
 """
@@ -82,7 +82,8 @@ def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArra
 def density_at(temperature: ArrayLike, density: float, reference_temperature: float) -> FloatArray:
     """Return the density at a temperature in K: ``rho_ref exp(-b dT (1 + 0.8 b dT))`` with ``b = 0.6278/rho_ref``.
 
-    `density` in kg/m^3 is rho_ref at the reference temperature, which is 60 F in ASTM D1250, table 54D.
+    `density` is rho_ref, the density in kg/m^3 at the reference temperature; dT is the difference from this
+    temperature. The formula is that of ASTM D1250, table 54D, in which the reference temperature is 60 F.
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))

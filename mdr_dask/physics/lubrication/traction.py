@@ -17,13 +17,14 @@ from mdr_dask.physics.lubrication.newton import log_viscosities
 def shear_stress(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> FloatArray:
-    """Return the shear stress at mid-film in units of p0 at the nodes; zero where the film has ended.
+    """Return the shear stress in the middle of the film at the nodes, in units of p0; zero where there is no film.
 
-    The Newtonian stress is ``tau = eta (u1 - u2)/h``, with the slide-roll ratio ``(u1 - u2)/u``. An Eyring stress tau_E
-    in p0 makes it ``tau_E asinh(tau/tau_E)``. The load parameter W is needed because of ``a/R = sqrt(8 W/pi)``.
+    The Newtonian stress is ``tau = eta (u1 - u2)/h``, with the slide-roll ratio ``(u1 - u2)/u``. With an Eyring stress
+    tau_E in units of p0, the stress is ``tau_E asinh(tau/tau_E)``. The load parameter W is needed for the ratio
+    ``a/R = sqrt(8 W/pi)``.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
-    exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), 600.0)  # against overflow
+    exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), 600.0)  # a larger exponent could overflow
     newtonian = np.where(grid.pressure > 0, slope * np.exp(exponent) / grid.film, 0.0)
     return newtonian if eyring_stress is None else eyring_stress * np.arcsinh(newtonian / eyring_stress)
 
@@ -31,7 +32,10 @@ def shear_stress(
 def sliding_coefficient(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> float:
-    """Return the integral of the shear stress at mid-film, divided by the load; arguments as in `shear_stress`."""
+    """Return the integral of the shear stress in the middle of the film, divided by the load.
+
+    The arguments are those of `shear_stress`.
+    """
     stress = shear_stress(case, grid, W, slide_roll_ratio, eyring_stress)
     return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
 

@@ -1,7 +1,7 @@
 """Matrices of the MDR transforms on graded panels, for functions that are a polynomial inside each panel.
 
 As functions of z = r^2, both transforms are Abel's half-integrals. Substitutions remove the square roots, and Gauss's
-rule integrates the result to rounding.
+rule then integrates them with no more than the rounding error.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels between `edges`, on which a function is a polynomial through the `nodes`.
+    """Panels between `edges`; on each panel, a function is the polynomial through its values at the `nodes`.
 
-    The `order` nodes of a panel are the interior Lobatto points and the right end. The first edge, 0, has no node,
-    because functions may jump there. `barycentric`, shape (panels, order + 1), holds the weights of interpolation; the
-    first panel uses only the last `order` weights.
+    Each panel has `order` nodes: the interior Lobatto points and the right end. There is no node at the first edge, 0,
+    because functions may jump there. `barycentric`, shape (panels, order + 1), holds the weights of barycentric
+    interpolation; in the row of the first panel, only the last `order` weights are used.
     """
 
     edges: FloatArray
@@ -66,7 +66,10 @@ class Panels:
 
 @lru_cache(maxsize=64)
 def graded_panels(left: int, right: int, order: int) -> Panels:
-    """Return panels of `order` > 1 nodes that become narrower towards both ends by `left` and `right` halvings."""
+    """Return panels on [0, 1], each with `order` > 1 nodes, that become narrower towards both ends.
+
+    The interval [0, 1/2] is halved `left` times towards 0, and the interval [1/2, 1] is halved `right` times towards 1.
+    """
     towards_left = 0.5 * 0.5 ** np.arange(left, -1, -1.0)
     towards_right = 1.0 - 0.5 * 0.5 ** np.arange(1.0, right + 1.0)
     edges = np.concatenate([[0.0], towards_left, towards_right, [1.0]])
@@ -88,7 +91,10 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
-    """Return the nodes through which the polynomial of a panel passes: its own, and the last of the previous panel."""
+    """Return the nodes through which the polynomial of a panel passes.
+
+    They are the nodes of this panel and the last node of the previous panel.
+    """
     return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
 
 
@@ -100,7 +106,7 @@ def _add_panel(
     matrices: tuple[FloatArray, ...],
     weights: FloatArray,
 ) -> None:
-    """Add the exact weights of one panel to the matrices, and to the weights of the integral over [0, 1]."""
+    """Add the contributions of one panel to the matrices, and to the weights of the integral over [0, 1]."""
     inner, full, outer, derivative = matrices
     size = members.size
     scale, middle = 2.0 / (high - low), 0.5 * (low + high)

@@ -100,7 +100,7 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A body with piecewise cubic f0(r) and g0(x) in units of d0 and a0; `length` is a0 in the unit of the body."""
+    """A body with piecewise cubic f0(r) and g0(x), both in units of d0; `length` is a0 in the unit of the body."""
 
     curve: PPoly
     image_curve: PPoly
@@ -129,7 +129,7 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start); if it is small, as an integral of the slope, to avoid cancellation."""
+        """Return g0(start + gap) - g0(start); for a small gap, the slope is integrated, to avoid cancellation."""
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -171,7 +171,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
 
 @jit
 def _piece(image: Image, place: float, derivative: int) -> float:
-    """Return the image (`derivative` 0) or its slope (`derivative` 1) at a position."""
+    """Return the image at a position if `derivative` is 0, or the slope of the image if `derivative` is 1."""
     cell = last_until(image.knots, place, 0, image.coefficients.shape[1])
     local, k = place - image.knots[cell], image.coefficients
     if derivative == 0:
@@ -229,7 +229,7 @@ def from_body(body: Any, depth: float) -> TableProfile:
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:
-    """Raise ValueError if a value is not finite, the first radius is not 0, or radii or heights do not increase."""
+    """Raise ValueError unless all values are finite, the first radius is 0, and both radii and heights increase."""
     if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
         raise ValueError(
             f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"

@@ -1,8 +1,8 @@
 """The transforms of piecewise linear functions on a uniform grid, with the singular weights integrated exactly.
 
-The error is proportional to the cell width to the power 2 for the inverse and 1.5 for the forward transform. For the
-pressure the power is 1, and the error is largest next to the axis. Unlike `half_integrals`, the grid accepts any number
-of kinks.
+With the cell width h, the error of the inverse transform is proportional to h^2, and that of the forward transform to
+h^1.5. The error of the pressure is proportional to h and largest next to the axis. Unlike the panels of
+`half_integrals`, this grid is suitable for functions with any number of kinks.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p / E* at the nodes; in the last cell, the integral ends at the contact edge."""
+        """Return p / E* at the nodes; in the last cell, the line load falls to zero at the contact edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -104,9 +104,10 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 
 
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
-    """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`; it diverges for r = low = 0.
+    """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`.
 
-    In that cell, the slope of the line load is taken as proportional to x with the same mean. The integral of slope / x
+    The integral is needed for the first cell as well, where it diverges for r = low = 0. There, the slope of the line
+    load is taken as proportional to x instead of constant, with the same mean. The integral of slope / x over the cell
     is then twice the mean slope, so the function returns 2.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))

@@ -1,7 +1,7 @@
 """Time integration of a worn contact with backward differentiation formulas (BDF) of order 1 to 3.
 
-The equations are stiff. The nodes follow the moving edge. In every step, Newton's method solves for the image and the
-edge together.
+The equations are stiff. The nodes move with the contact edge. In every step, Newton's method solves for the image and
+the position of the edge together.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels
 from mdr_dask.physics.outcome import Outcome
 
-#: Local error of a BDF step of order 1, 2 and 3, as a fraction of the difference between result and extrapolation.
+#: The local error of a BDF step of order 1, 2 or 3 is this fraction of the difference between the result and the value
+#: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
@@ -48,11 +49,11 @@ class NotConvergedError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """The contact at one time: cycles N in partial slip, sliding path s in gross slip.
+    """The contact at one `time`, which is the number of cycles N in partial slip and the sliding path s in gross slip.
 
-    `unknowns`, all of the order of one, begin with the image at all nodes except the last. Then come the width of the
-    panels in squared radii, divided by its virgin value, and the further unknowns of the problem. `accumulated`, shape
-    (nodes,), is the worn quantity at the nodes; it is zero at the edge.
+    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The next unknown is the
+    width of all panels together, in squared radii, divided by the width in the virgin contact. The other unknowns
+    depend on the problem. `accumulated`, shape (nodes,), is the worn depth at the nodes, which is zero at the edge.
     """
 
     time: float
@@ -61,23 +62,23 @@ class Moment:
 
 
 class Problem(Protocol):
-    """One kind of slip, given by the equations of one time step."""
+    """The equations of one time step for one kind of slip (partial or gross)."""
 
     @property
     def panels(self) -> Panels:
         """Return the panels between the inner border and the edge."""
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether the unknowns describe a possible contact."""
+        """Return whether the unknowns describe a possible geometry, for example a contact of positive width."""
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return whether a solution of the equations is a possible contact, within a tolerance."""
+        """Return whether a solution of the equations is physically possible, within a tolerance."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
 
     def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns: the weighted sum of the past accumulated values at the nodes."""
+        """Return a function of the unknowns that computes the contributions of the past moments to the residual."""
 
     def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
         """Return the moment at the end of a solved step."""
@@ -100,10 +101,11 @@ def march(
     start: Moment | None = None,
     stops: Callable[[Any], bool] = lambda moment: False,
 ) -> list[Any]:
-    """Return the first moment and the end of every accepted step.
+    """Return the contact at the start and at the end of every accepted step.
 
     The last step ends at or beyond `end`, or at a moment for which `stops` returns True. `tolerance` is the error of
-    `Problem.worn` allowed in one step, and `first` is the length of the first step. The steps do not depend on `end`.
+    `Problem.worn` that is allowed in one step, and `first` is the length of the first step. The steps do not depend on
+    `end`.
     """
     newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]
@@ -127,7 +129,10 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as a solution of the discrete equations, so that a march does not begin with a jump."""
+    """Return the virgin contact as a solution of the discrete equations.
+
+    A march that begins with this contact does not jump in its first step.
+    """
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
@@ -135,14 +140,14 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
-    """Return the number of steps before a time within the history, and the moment at this time.
+    """Return the number of moments in the history that are earlier than `time`, and the moment at this time.
 
-    If the history has no such moment, a few additional steps lead to it.
+    If the history contains no moment at this time, it is computed by one or more additional steps.
     """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
-    if time < np.finfo(np.float64).tiny:  # the inverse of such a time overflows
+    if time < np.finfo(np.float64).tiny:  # 1 / time would overflow
         return 0, history[0]
     newton, past, next_time = _Newton(problem, tolerance), list(history[:before]), time
     while past[-1].time < time:
@@ -169,7 +174,10 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time: float) -> tuple[Moment | None, float]:
-    """Return the moment after one step of the highest order possible, and its error; None if Newton's method fails."""
+    """Return the moment after one step of the highest possible order, and the error of the step.
+
+    If the step fails, the moment is None.
+    """
     past = list(history[-1:-4:-1])
     order = len(past)
     shares = _backward_shares(np.array([time, *(m.time for m in past)]))
@@ -208,7 +216,8 @@ class _Newton:
     ) -> FloatArray | None:
         """Return the solution, or None if the iteration fails.
 
-        If convergence is slow, the Jacobian is renewed if `fresh` is True; otherwise the iteration fails.
+        If convergence is slow and `fresh` is True, the Jacobian is renewed. If convergence is slow and `fresh` is
+        False, the iteration fails.
         """
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(MOST_ITERATIONS):
@@ -237,7 +246,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian; the columns of the unknowns after the image are finite differences."""
+        """Factorise the Jacobian; its columns for the unknowns that follow the image are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
@@ -249,7 +258,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return the weights for the derivative at times[0] of the polynomial that interpolates values at `times`."""
+    """Return weights: the weighted sum of values at `times` is the derivative of their polynomial at times[0]."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -262,7 +271,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return the weights for the value at `time` of the polynomial that interpolates values at `times`."""
+    """Return weights: the weighted sum of values at `times` is the value of their polynomial at `time`."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

@@ -1,6 +1,7 @@
 """Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force.
 
-Each contact is solved three times, each time with coarser panels and longer steps; the differences give the error.
+Each contact is solved three times, each time with coarser panels and longer steps. The differences between these
+solutions give the error.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ COARSEST = 2e-3
 body.
 """
 COARSEST_OF_MOVING = 3e-4
-"""The same under constant force, where longer steps cannot follow the border."""
+"""The same limit for constant force, where longer steps cannot follow the stick border."""
 ENDED = 1e4
-"""Value of N / sqrt(a^2 - c^2) from which on the limiting profile is returned. The difference from it falls at least as
-fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the rounding error.
+"""If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
+falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is then below the rounding error.
 """
 JUMP = 0.1
 """If y = 1 - (d - g) / eta exceeds this value in the panel next to the border, the border no longer moves."""
@@ -50,7 +51,7 @@ FLAT = 1e-2
 because the border of a steep body moves far during the first moments of wear.
 """
 ROUGHER = 4.0
-"""Ratio of the step tolerance of each rougher solution to that of the previous solution."""
+"""Ratio of the step tolerance of each coarser solution to that of the previous solution."""
 EDGE = 0.2
 """The stated error of a radius is at least this fraction of its change in the last time step. All solutions share this
 error: a position that the edge passes within a step begins to wear only at the end of the step.
@@ -62,9 +63,10 @@ SHARPEST = 8.0
 
 
 class Resolution(NamedTuple):
-    """Panels and steps for an allowed error of the profile f, divided by eta d0.
+    """Panels and steps for a given `accuracy`, the allowed error of the profile f divided by eta d0.
 
-    `rougher` is 0 for the solution, and 1 and 2 for the two rougher solutions from which its error is estimated.
+    `rougher` is 0 for the solution itself. It is 1 and 2 for the two coarser solutions from which the error is
+    estimated.
     """
 
     accuracy: float
@@ -79,12 +81,12 @@ class Resolution(NamedTuple):
     def first(self) -> float:
         """The length of the first step, as a fraction of the time scale of the contact.
 
-        Its upper limit keeps the error of small amounts of wear below 2 %.
+        It is limited, so that the error of small amounts of wear remains below 2 %.
         """
         return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
 
     def panels(self, near: int) -> Panels:
-        """Return panels of partial slip, with `near` additional halvings at the inner border."""
+        """Return the panels for partial slip, which are halved `near` more times towards the stick border."""
         digits = -np.log10(self.accuracy)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
         levels = max(round(2.7 * digits - 3.3), 2)
@@ -174,7 +176,7 @@ def exact(
 
 
 class _Leg(NamedTuple):
-    """A part of an evolution: problem, moments, tolerance of a step, and the energy dissipated before this part."""
+    """A part of an evolution: the equations, the moments, the tolerance of a step, and the energy dissipated before."""
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
@@ -187,7 +189,10 @@ class _Leg(NamedTuple):
         return float(self.moments[-1].time)
 
     def at(self, time: float) -> tuple[Any, float, float]:
-        """Return the moment at a time, the dissipated energy divided by mu, and the least stated error of the edge."""
+        """Return the moment at a time, and two numbers.
+
+        They are the dissipated energy divided by mu, and a lower limit for the stated error of the contact radius.
+        """
         number, moment = at(self.problem, self.moments, time, self.tolerance)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
@@ -198,7 +203,7 @@ class _Leg(NamedTuple):
 def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
-    """Return the contact after each wanted number of cycles, from a single solution."""
+    """Return the contact after each wanted number of cycles; all are taken from the same solution."""
     c = max(_moved(profile, stick_radius, FLAT * resolution.step), stick_radius) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
@@ -242,7 +247,7 @@ def _fretted(
 
 
 def _moved(profile: Profile, c: float, rise: float) -> float:
-    """Return the stick border b of a body without wear whose depth has increased: g0(b) = g0(c) + rise * eta."""
+    """Return the stick border b after the virgin body is pressed deeper by rise * eta: g0(b) = g0(c) + rise * eta."""
     level = float(profile.image(np.array(c)))
     return profile.inside(level + rise * (1.0 - level))
 
@@ -263,9 +268,10 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
 
 
 def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
-    """Return the image in the annulus that the border has passed, with its slope as a function of position.
+    """Return radii that the stick border has passed, the depths at these times, and the slope of the image.
 
-    The image follows from radii of the border, and the depths in d0 at these times.
+    The depths are in d0. The image at such a radius remains the depth at that time minus eta. The slope, between these
+    radii, is a function of position.
     """
     places, depths = rising(path)
     radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
@@ -281,12 +287,12 @@ def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatAr
 def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """Return the limiting profile of a contact whose stick border stops at `moment`.
 
-    In the end the stick zone carries the whole force, so that g = d = (F/2 + int_0^b g dx) / b beyond the border b. The
-    radius a of the scar is the root of int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
+    In the end, the stick zone carries the whole force. Therefore, g = d = (F/2 + int_0^b g dx) / b beyond the border b.
+    The radius a of the scar is the root of int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, (radii, reached, frozen_slope) = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
-    # int_0^b g dx includes the annulus from c to b, where g = d' - eta; d' is the depth when the border was there
+    # between c and b, g = d' - eta in int_0^b g dx, where d' is the depth at which the border passed this radius
     annulus = float(np.trapezoid((reached - 1.0) / eta - 1.0, radii))
     load = float(problem.load or 0.0)
     depth = 1.0 + eta * (load + annulus) / border
@@ -314,7 +320,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
 
 
 def _contact(leg: _Leg, time: float) -> Worn:
-    """Turn the nodal values of partial slip at one time into a worn contact."""
+    """Return the worn contact at one time in partial slip, computed from the values at the nodes."""
     problem, (moment, energy, edge_error) = leg.problem, leg.at(time)
     assert isinstance(problem, PartialSlip)
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.inner_radius
@@ -366,16 +372,19 @@ def _contact(leg: _Leg, time: float) -> Worn:
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return limits of integration that are dense inside the border, where the frozen image becomes steep."""
+    """Return limits of integration between c and the border.
+
+    They become denser towards the border, because the image is steep there.
+    """
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
 
 
 def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
-    """Return the contact after each wanted sliding path, from a single solution.
+    """Return the contact after each wanted sliding path; all are taken from the same solution.
 
-    At the axis f is the power n/2 of r^2, so a body with n < 2 needs smaller panels there.
+    Near the axis, f is proportional to the power n/2 of r^2, so a body with n < 2 needs smaller panels there.
     """
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
     sharpness = float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
@@ -387,7 +396,9 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
 
 def _slid_contact(leg: _Leg, path: float) -> Worn:
-    """Turn the nodal values after one sliding path into a worn contact. Its image is NaN outside the contact."""
+    """Return the worn contact after one sliding path, computed from the values at the nodes. Its image is NaN outside
+    the contact.
+    """
     problem, (moment, energy, edge_error) = leg.problem, leg.at(path)
     assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated

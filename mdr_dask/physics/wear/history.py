@@ -1,7 +1,7 @@
-"""Wear under histories of amplitude, depth and force; every block is a new problem of partial or gross slip.
+"""Wear under blocks of different amplitude, depth or force; every block is a new problem of partial or gross slip.
 
 The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
-grid is uniform, because earlier blocks leave stick borders at different radii.
+grid is uniform, because each block leaves a kink or a jump of the image at its own stick border.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def history(
 ) -> list[Worn]:
     """Return the contact at the end of every block, worn from a virgin body with the contact radius 1 at depth 1.
 
-    The error is about proportional to the cell width, and to its root once the image has a jump. `reach` is the largest
-    radius of the grid in units of a0. `errors` adds solutions with 1/2 and 1/4 of the cells, from which errors are
-    estimated.
+    The error is about proportional to the cell width, or, once the image has a jump, to the square root of the cell
+    width. `reach` is the largest radius of the grid in units of a0. If `errors` is True, the errors are estimated from
+    two more solutions, with 1/2 and 1/4 of the cells.
     """
     length = min(reach, profile.largest_radius)
     fine, *rough = (

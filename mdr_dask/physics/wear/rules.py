@@ -1,8 +1,8 @@
 """The fast rule of the thesis for wear at constant depth, and the limiting profile, for any body of revolution.
 
-In the fast rule (thesis eq. 6.11), y = (g - g0(c)) / eta with eta = 1 - g0(c) follows a logistic law up to r = 1, and g
-- 1 decays beyond. Both contain the remaining fraction exp(-xi N / a(c)), which is zero in the limiting profile (eqs.
-6.8-6.10).
+In the fast rule (thesis eq. 6.11), y = (g - g0(c)) / eta with eta = 1 - g0(c) follows a logistic law up to x = 1.
+Beyond x = 1, g - 1 decays exponentially. Both laws contain the remaining fraction exp(-xi N / a(c)). In the limiting
+profile (eqs. 6.8-6.10), the remaining fraction is zero.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One case of the rule: virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), remaining fraction."""
+    """One case: virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), and `rest`, the remaining fraction."""
 
     image: Image
     c: float
@@ -169,7 +169,10 @@ def _changes(rule: Rule, places: FloatArray) -> FloatArray:
 
 @jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
-    """Write the ends of the pieces to `cuts`: c, the end of the layer beyond c, two larger radii, and 1."""
+    """Write the ends of the pieces of integration to `cuts`.
+
+    They are c, the radius at which y = 1/2, two larger radii, and 1.
+    """
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
     if rule.rest == 0.0:
         high = 0.0
@@ -224,8 +227,9 @@ def _scar_radius(
 ) -> float:
     """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is none.
 
-    The values are those of the integral at both ends. The method is that of Anderson and Björck: the false position,
-    with a smaller value at an end that was not replaced in two successive steps.
+    `low_value` and `high_value` are the values of the integral at `low` and `high`. The method is that of Anderson and
+    Björck: the false position, in which the value at one end is reduced if this end was not replaced in two successive
+    steps.
     """
     if not high_value < 0.0 < low_value:
         return high
@@ -296,7 +300,7 @@ def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> floa
 
 @jit
 def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
-    """Return radius, volume and force of the cases (n, c)."""
+    """Return scar radius, volume and force of limiting profiles; the rows of `cases` are n and c."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         rule = _power_rule(no_table, cases[0, k], cases[1, k], 0.0)
@@ -307,7 +311,7 @@ def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> Float
 
 @jit
 def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
-    """Return radius, volume and force of the cases (n, c, N, xi, a(c))."""
+    """Return scar radius, volume and force by the fast rule; the rows of `cases` are n, c, N, xi and a(c)."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]

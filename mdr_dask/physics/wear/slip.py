@@ -22,13 +22,15 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Moment, settled
 
-#: Weight of the border relative to the depth in the error of a step; beyond the border, f rises like a square root.
+#: Weight of the stick border in the error of a step, relative to the weight of the depth. The weight of the border is
+#: large, because f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
-#: Position on the panels up to which the rise of the plateau is stored; the border is at 0, the edge at 1.
+#: Position on the panels up to which `SlipMoment.moved` is stored; the stick border is at 0, and the contact edge at 1.
 BEYOND = 1.25
 #: Lower limit of q, so that its logarithm is finite.
 SMALLEST = 1e-30
-#: `_piece` uses a series if sqrt(r^2 - b^2) changes along the piece by less than this fraction of the sum at both ends.
+#: `_piece` uses a series if the values of sqrt(r^2 - b^2) at both ends of the piece differ by less than this fraction
+#: of their sum.
 SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
@@ -59,12 +61,13 @@ class Place(NamedTuple):
 
 
 class Past(NamedTuple):
-    """Past moments, the newest first, with their `shares` in the formula of one step.
+    """Past moments, the newest first; `shares` are their weights in the BDF formula of one step.
 
-    `worn`, shape (moments, nodes), holds the worn depths. If the border does not move, `frozen` (the worn depth there,
-    else NaN) is subtracted, and the result is divided by sqrt(z) with the position z on the panels. At constant depth
-    (`is_growth`), `worn` holds ln(s / s0) instead, because s grows exponentially from a very small s0. `path` and
-    `moved` belong to the newest moment, see `SlipMoment`; `carried` is from `PartialSlip.carried`.
+    `worn`, shape (moments, nodes), holds the worn depths while the stick border moves; `frozen` is then NaN. If the
+    border no longer moves, `frozen` is the worn depth at the border, and `worn` holds (worn depth - frozen) / sqrt(z)
+    with the position z on the panels. At constant depth (`is_growth`), `worn` holds ln(s / s0), because s grows
+    exponentially from a very small s0. `path` and `moved` are those of the newest moment (see `SlipMoment`), and
+    `carried` is the result of `PartialSlip.carried`.
     """
 
     shares: FloatArray
@@ -82,8 +85,9 @@ class Past(NamedTuple):
 class SlipMoment(Moment):
     """A moment of partial slip.
 
-    `path`, shape (2, k), holds border and depth while the border moved, joined by straight lines. `moved` is the rise
-    of the plateau along the path, at the nodes and in one panel beyond the edge.
+    `path`, shape (2, k), holds the stick border and the depth at the moments at which the border moved; both vary
+    linearly in between. `moved` is the rise of f_star along the path (see `PartialSlip`), at the nodes and in one more
+    panel beyond the edge.
     """
 
     path: FloatArray
@@ -94,15 +98,17 @@ class SlipMoment(Moment):
 class PartialSlip:
     """Slip s = (f - f_star) / eta outside the stick border b.
 
-    Inside b the image keeps the value g = d - eta that it had when the border passed. f_star is the profile of an image
-    that equals g up to b and d - eta (the plateau) beyond. While the plateau rises by dd, f_star rises by (2/pi)
-    arccos(b / r) dd, so it is enough to store the path (b, d). At constant depth b stays at c. Under constant force b
-    moves outwards until the image jumps there.
+    When the border passes a radius, the image there is g = d - eta with the depth d at this time; afterwards, the image
+    does not change. f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While
+    the plateau rises by dd, f_star rises by (2/pi) arccos(b / r) dd, so it is enough to store the path (b, d). At
+    constant depth, the border b stays at c. Under constant force, the border moves outwards until the image has a jump
+    at the border.
 
     The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
-    Under constant force the depth follows, and then the border as long as it moves. `load` is half the force on the
-    virgin slip zone divided by eta, None at constant depth. `border` is q at a border that does not move, else None,
-    and `frozen` is the worn depth there.
+    Under constant force, the next unknown is the depth. As long as the border moves, the last unknown is the border.
+    `load` is half of the force on the virgin slip zone, divided by eta; at constant depth, it is None. If the border
+    does not move, `border` is the value of q at the border, and `frozen` is the worn depth there. If the border moves,
+    `border` is None.
     """
 
     profile: Profile
@@ -136,12 +142,12 @@ class PartialSlip:
         return Place(border, float(unknowns[self.size - 1]), 0.0 if self.load is None else float(unknowns[self.size]))
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether the unknowns describe a possible contact."""
+        """Return whether the slip zone has a positive width, and the border b is not far inside c."""
         place = self.place(unknowns)
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return whether y >= 0 beyond a moving border, or s >= 0 beyond a border that does not move."""
+        """Return whether the slip zone has y >= 0 if the border moves, or s >= 0 if it does not move."""
         positive = unknowns[: self.size - 1] if self.border is None else self.slip(unknowns)
         return bool(np.min(positive) >= -tolerance)
 
@@ -169,7 +175,7 @@ class PartialSlip:
         return forced, replace(virgin, unknowns=np.append(virgin.unknowns, [0.0, 0.0]))
 
     def stop(self, moment: SlipMoment) -> tuple[PartialSlip, SlipMoment]:
-        """Return the problem in which the border no longer moves, and its first moment."""
+        """Return the problem in which the border no longer moves, and the first moment of that problem."""
         border = moment.path[0, -1:]
         still = replace(self, border=float(border[0]), frozen=float(self.frozen_depth(moment.path, border)[0]))
         return still, replace(moment, unknowns=moment.unknowns[:-1])
@@ -177,7 +183,8 @@ class PartialSlip:
     def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """Return a function of the unknowns that computes the contributions of the past moments to the residual.
 
-        They are the contributions to s and to the worn depth at the nodes, and the additional load of the stick zone.
+        They are the contributions to s and to the worn depth at the nodes, and the increase of the load of the stick
+        zone.
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
@@ -242,9 +249,10 @@ class PartialSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes; at the last node, this is the continuity of s at the edge.
+        """Return s - known - theta (p / eta) s at the nodes; the value at the edge is zero if s is continuous there.
 
-        Under constant force, the deviation of the load follows, and then y at a moving border.
+        Under constant force, the next value is the deviation of the load. If the border moves, the last value is y at
+        the border.
         """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
@@ -286,7 +294,9 @@ class PartialSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities whose step error is controlled: s at the nodes, the depth, and a moving border."""
+        """Return the quantities whose error is controlled in every step: s at the nodes, the depth, and a moving
+        border.
+        """
         weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -329,7 +339,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a path at which the border is farther out than ever before: positions and depths."""
+    """Return border and depth at the points of a path at which the border is farther out than at all earlier ones."""
     furthest = np.maximum.accumulate(path[0])
     new = np.append(True, np.diff(furthest) > 0.0)
     return furthest[new], path[1, new]
@@ -337,7 +347,7 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @jit
 def _known(mesh: Mesh, body: VirginBody, past: Past, place: Place) -> FloatArray:
-    """Return the past contributions to s and to the worn depth at the nodes, and the load of the stick zone."""
+    """Return the contributions that are described in `PartialSlip.memory`, one after the other."""
     nodes, path, is_still = past.worn.shape[1], past.path, past.frozen == past.frozen
     result = np.empty(2 * nodes + 1)
     border, depth = path[0, -1], path[1, -1]
@@ -392,7 +402,7 @@ def _plateau_rise(body: VirginBody, path: FloatArray, places: FloatArray) -> Flo
 
 @jit
 def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
-    """Return the rise of the plateau at q along the path, (2/pi) int arccos(b / r) dd for borders b below r."""
+    """Return the rise of f_star at q along the path: (2/pi) int arccos(b / r) dd over the part with b < r."""
     total = 0.0
     for k in range(1, path.shape[1]):
         total += _piece(body, path[0, k - 1], path[0, k], path[1, k] - path[1, k - 1], q)
@@ -401,7 +411,7 @@ def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
 
 @jit_inline
 def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
-    """Return the rise of the plateau at q on a straight piece of the path, along which the depth changes by `change`.
+    """Return the rise of f_star at q on a straight piece of the path; the depth rises by `change` along the piece.
 
     The integrand is a smooth function of sqrt(r^2 - b^2).
     """
@@ -441,11 +451,11 @@ class GrossSlip:
         return math.sqrt(unknowns[self.panels.nodes.size - 1])
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether the unknowns describe a possible contact."""
+        """Return whether the squared contact radius is positive."""
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return True, because no solution of the equations is known that is not a possible contact."""
+        """Return True, because all known solutions of the equations are possible contacts."""
         return True
 
     def start(self) -> Moment:
@@ -455,7 +465,7 @@ class GrossSlip:
         return Moment(0.0, unknowns, np.zeros(self.panels.nodes.size))
 
     def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns: the weighted sum of past accumulated values at the nodes."""
+        """Return a function of the unknowns: the weighted sum of the past worn depths at the nodes."""
         last = self.panels.nodes.size - 1
 
         def known(unknowns: FloatArray) -> FloatArray:
@@ -500,7 +510,7 @@ class GrossSlip:
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return f - f0 - known - theta p at the nodes and, if the force is given, the deviation of the force.
 
-        At the last node, this is the continuity of f at the edge.
+        The value at the last node, the edge, is zero if f is continuous there.
         """
         virgin = self.profile.height(self.edge(unknowns) * np.sqrt(self.panels.nodes))
         rows = self.worn(unknowns) - virgin - self._accumulated(unknowns, theta, known)

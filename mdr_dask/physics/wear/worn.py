@@ -1,4 +1,4 @@
-"""The worn contact that every rule and evolution returns, with its error and the transforms of its shape.
+"""The worn contact that all rules and evolutions return, its errors, and the transforms of its image.
 
 Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*). Heights f are
 measured upwards from the virgin apex, so wear increases f.
@@ -49,12 +49,13 @@ class Worn:
         The dissipated energy divided by mu, in the unit of volume. According to the wear law, it equals the wear
         volume. NaN if it is unknown.
     rougher : tuple of Worn
-        One or two rougher solutions of the same contact, from which its error is estimated.
+        One or two coarser solutions of the same contact. The errors are estimated from the differences between this
+        solution and the coarser ones.
     least_errors : mapping of str to float
-        Lower limits of the stated errors, indexed by the name of the output. A limit is given if the rougher solutions
-        may agree by chance in this output.
+        Lower limits of the stated errors, indexed by the name of the output. A limit is given for an output in which
+        all solutions may agree by chance.
     relative_error : float
-        Error of every output divided by the largest value of the output; used if there is no rougher solution.
+        Error of every output divided by the largest value of the output; used if there is no coarser solution.
     """
 
     contact_radius: float
@@ -80,7 +81,7 @@ class Worn:
     def error(self, output: str, places: FloatArray) -> float | FloatArray:
         """Return the expected absolute error of an output; for functions, at the positions `places`.
 
-        The error follows from the differences between this solution and the rougher ones. Without rougher solutions,
+        The error follows from the differences between this solution and the coarser ones. Without coarser solutions,
         the error is `relative_error` times the largest value.
         """
         if not self.rougher:
@@ -96,7 +97,8 @@ class Worn:
         return np.asarray(SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide)))
 
     def _distance(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the difference from the first rougher solution, or half that from the second one if it is larger.
+        """Return the difference from the first coarser solution, or half of the difference from the second if that is
+        larger.
 
         Both are used, because two solutions may agree by chance.
         """
@@ -106,7 +108,7 @@ class Worn:
         return np.asarray(np.max(gaps, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
-        """Return positions that are dense at the borders of stick zone and contact, up to at least `last`."""
+        """Return positions from 0 to at least `last`, which are dense near the stick border and the contact edge."""
         farthest = max(last, *(one.contact_radius for one in self.rougher))
         cuts = sorted({0.0, self.stick_border, self.contact_radius, farthest})
         steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
@@ -183,7 +185,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        # a change of the image that is very near to the border is included in the jump
+        # a change of the image within this distance of the border is part of the jump
         changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
