@@ -167,7 +167,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write a tile, and return the number of its cells; the tile covers `cells` cells of the line from node `first` on.
+    """Write the tile for `cells` cells of the line from node `first` on, and return the number of cells of the tile.
 
     Each cell of the line is divided into ``weights.shape[1]`` cells of the tile. The nodes of a tile include one node
     before and one node after these cells.

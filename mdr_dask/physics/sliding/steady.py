@@ -101,10 +101,10 @@ def _solve(
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
     The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent reaches
-    `load` is an upper bound of the solution, and so is the depth at which full contact carries the load. The search
-    ends at a lattice depth that carries at most `load` if the tangent reaches `load` before the next lattice depth. The
-    result does not depend on the guess in `trail`, because there is only one largest lattice depth that carries at most
-    `load`. `sums` receives the sums at this depth.
+    `load` is an upper bound of the solution, and so is the depth at which full contact carries the load. If a lattice
+    depth carries at most `load`, and the tangent at this depth reaches `load` before the next lattice depth, the search
+    ends there. The result does not depend on the guess in `trail`, because there is only one largest lattice depth that
+    carries at most `load`. `sums` receives the sums at this depth.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf

@@ -329,8 +329,8 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
     The displacement of free elements has a lower bound, computed along the line from the last known displacement and
     the least drift. The *gap* is this bound minus the largest depth + h in the cell. If the gap is too wide to have
     opened since the elements separated, there was a gap all the time; the cell is then skipped until the line has
-    approached the elements by the width of the gap. The gap closes at most at the rate of the depth plus the largest
-    drift. The *approach* is the integral of this largest rate over time.
+    approached the elements by the width of the gap. The rate at which the gap closes is at most the rate of the depth
+    plus the largest drift. The *approach* is the integral of this upper limit over time.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, skip, lift = now.track, work.recovery.bounds, work.skip, search.lift

@@ -9,9 +9,9 @@ reduced by the decay since then:
 This formula needs only the history of the depth d(t). The element separated from the line where the expression in the
 maximum is stationary; there, the force on the element was zero.
 
-The *drift* of free elements is D u' + u, where u' is the derivative along the line. It is equal to minus the rate of
-the depth at the time of separation, reduced by the decay since then. Its extremes over the recent past (`PathBounds`)
-bound how fast u can change along the line.
+The *drift* of free elements is D u' + u, where u' is the derivative along the line. The drift is equal to minus the
+rate of the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent
+past (`PathBounds`) limit how fast u can change along the line.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ WINDOW, WINDOWS = 8.0, 16
 
 
 class Instant(NamedTuple):
-    """An instant after the jump: the line, the contact before the jump, and depth and rate up to this instant.
+    """An instant after the jump: the line, the contact before the jump, and the depth and its rate up to this instant.
 
     `time` is the time since the jump, `deborah` belongs to the velocity after the jump, and `left` is exp(-time), the
     decay of displacements since the jump.
@@ -226,7 +226,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope and du/d(depth) of an element at x that separated in entry k of `recovery`."""
+    """Return displacement, slope and du/d(depth) of an element at x that separated at entry k of `recovery`."""
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0

@@ -30,7 +30,7 @@ NEWTON = 0.2  # largest last Newton step of the depth, divided by the change of 
 # fraction is SETTLED or, if larger, OF_ACCURACY times the allowed error of the drag divided by the estimated transient.
 SETTLED = 0.04
 OF_ACCURACY = 0.1
-NEGLIGIBLE = 1e-5  # the change of the steady depth counts as at least this fraction of the mean displacement
+NEGLIGIBLE = 1e-5  # a smaller change of the steady depth is replaced by this fraction of the mean displacement
 # the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
 # NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
 LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
@@ -85,11 +85,11 @@ class Path(NamedTuple):
 
 
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the values at `places` of piecewise cubics with given slopes; each row contains the points of one curve.
+    """Interpolate curves by cubics with given slopes, and return the values at `places`.
 
-    If the first slope of a row is NaN, the first piece is a parabola. A slope that is much steeper than the secants at
-    its point is due to a single asperity that enters or leaves contact. It is reduced, so that the cubic does not
-    overshoot.
+    Each row contains the points of one curve. If the first slope of a row is NaN, the first piece is a parabola. A
+    slope that is much steeper than the secants at its point is due to a single asperity that enters or leaves contact.
+    Such a slope is reduced, so that the cubic does not overshoot.
     """
     secants = np.diff(rows) / np.diff(x)
     beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
