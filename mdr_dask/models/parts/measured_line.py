@@ -53,25 +53,21 @@ class ProfileFile(NamedByFile):
 
     def notes(self) -> tuple[str, ...]:
         """Return notes on points, length, rms height and rms slope of the line, and remarks about the file."""
-        remarks = (*_scan(self).remarks, *doubts_of_line(line_of(self), self.detrend))
-        return (_statistics(self), *(f"profile {self.file.name}: {remark}" for remark in remarks))
+        from mdr_dask.physics.surfaces.waves import waves_of
+
+        line = line_of(self)
+        height, slope = float(line.height.std()), waves_of(line.height).rms_slope() / line.length
+        statistics = (
+            f"{line.height.size} points, {shown(line.length, 'm')} long, rms height {shown(height, 'm')}, "
+            f"rms slope {slope:.3g}"
+        )
+        remarks = (statistics, *_scan(self).remarks, *doubts_of_line(line, self.detrend))
+        return tuple(f"profile {self.file.name}: {remark}" for remark in remarks)
 
 
 @lru_cache(maxsize=16)
 def _scan(profile: ProfileFile) -> Scan:
     return read_scan(profile.file, Units(profile.unit, profile.x_unit, profile.spacing))
-
-
-@lru_cache(maxsize=16)
-def _statistics(profile: ProfileFile) -> str:
-    from mdr_dask.physics.surfaces.waves import waves_of
-
-    line = line_of(profile)
-    height, slope = float(line.height.std()), waves_of(line.height).rms_slope() / line.length
-    return (
-        f"profile {profile.file.name}: {line.height.size} points, {shown(line.length, 'm')} long, "
-        f"rms height {shown(height, 'm')}, rms slope {slope:.3g}"
-    )
 
 
 @lru_cache(maxsize=16)

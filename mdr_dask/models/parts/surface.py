@@ -135,22 +135,17 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
     if surface.extrapolate:
         spectrum = spectrum.continued(*ends)
     longest, shortest = spectrum.wavelengths
-    beyond = [
-        _beyond(name, end, *(("most", longest) if end > longest else ("least", shortest)))
-        for name, end in zip(("longest_wavelength", "shortest_wavelength"), ends, strict=True)
-        if end and not shortest * (1 - 1e-9) <= end <= longest * (1 + 1e-9)
-    ]
+    beyond = []
+    for name, end in zip(("longest_wavelength", "shortest_wavelength"), ends, strict=True):
+        if end and not shortest * (1 - 1e-9) <= end <= longest * (1 + 1e-9):
+            given, limit = shown_apart("m", end, longest if end > longest else shortest)
+            beyond.append(
+                f"{file.name}: expected {name} of at {'most' if end > longest else 'least'} {limit}, where the "
+                f"spectrum ends, got {given} (`extrapolate: true` continues it by a power law)"
+            )
     if beyond:
-        raise DataError("; ".join(f"{file.name}: {sentence}" for sentence in beyond))
+        raise DataError("; ".join(beyond))
     return spectrum.between(ends[0], ends[1] or min(found.resolution, longest))
-
-
-def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
-    given, limit = shown_apart("m", wavelength, end)
-    return (
-        f"expected {name} of at {which} {limit}, where the spectrum ends, got {given} "
-        "(`extrapolate: true` continues it by a power law)"
-    )
 
 
 @lru_cache(maxsize=64)
