@@ -2,5 +2,5 @@
 
 `line_contact` solves for the film on finer and finer grids. For rough rollers, `load_sharing` divides the load between
 film and asperities, `clusters` finds the intervals in which the asperities of both rollers overlap, and `breakthrough`
-decides in which of these intervals they break the boundary layer.
+decides in which of these intervals the asperities break the boundary layer.
 """

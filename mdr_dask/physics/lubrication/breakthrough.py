@@ -113,7 +113,7 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
 
 @jit
 def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
-    """Add the contributions of all clusters to `jumps`, then replace `jumps` by the trace, its cumulative sum."""
+    """Add the contributions of all clusters to `jumps`, then replace `jumps` by its cumulative sum: the trace."""
     points = jumps.size - 1
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
     for c in range(clusters.start.size):
@@ -151,7 +151,7 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
 
 
 class Pair(NamedTuple):
-    """Splines of the heights of two closed lines in m (see `surfaces.splines`), separated by a film.
+    """The heights of two closed lines, as splines in m (see `surfaces.splines`), and the film between the lines.
 
     `level` is the film h0 in m, `spacing` is the distance between neighbouring nodes in m, and `strength` is the result
     of `layer_strength` in 1/m.
@@ -174,7 +174,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Return the length of a cluster beyond an edge of the window, and the integral of ``z - h0`` over it.
+    """Return the length of a cluster beyond an edge of the window, and the integral of ``z - h0`` over this length.
 
     The cluster is followed to the right of the edge if `most` is positive, and to the left if it is negative, up to the
     distance ``|most|``.

@@ -22,7 +22,7 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Replace the entries of `row`, second integrals of ``ln|x|``, by integrals of ``ln|x|`` times a hat function.
+    """Turn `row` from second integrals of ``ln|x|`` into integrals of ``ln|x|`` times the hat function of each node.
 
     The hat function of a node is 1 at this node, 0 at all other nodes, and linear in between. The entries of the first
     and the last node become zero.
@@ -39,7 +39,10 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``; first and last are 0."""
+    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``.
+
+    The first and the last entry are 0.
+    """
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)

@@ -156,7 +156,7 @@ def cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return the value of a quantity that is expected on a grid with another spacing.
+    """Return the expected value of a quantity on a grid with another spacing.
 
     `reading` evaluates the quantity on one grid. If there are at least two solutions, the value is extrapolated from
     the last two; the error of the quantity is taken as proportional to the square of the spacing.

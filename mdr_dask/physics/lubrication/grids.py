@@ -73,7 +73,7 @@ def _halved_by(share: float, cells: int) -> int:
 
     `share` is the number of cells before the front, divided by the number of cells before the end of the film.
     """
-    far = int(0.5 / max(1 - share, 4 / cells))  # the fraction of n * share repeats if n grows by 1 / (1 - share)
+    far = int(0.5 / max(1 - share, 4 / cells))  # the fractional part of n * share repeats if n grows by 1 / (1 - share)
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 

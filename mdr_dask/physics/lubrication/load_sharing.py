@@ -30,7 +30,7 @@ _APART = 9.0
 def mean_overlap(distance: float) -> float:
     """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z, in rms heights.
 
-    The mean heights of both lines are the distance d apart.
+    z is the sum of the heights of two lines, and d is the distance between the mean heights of the lines.
     """
     return max(exp(-(distance**2) / 2) / sqrt(2 * pi) - distance * erfc(distance / sqrt(2)) / 2, 0.0)
 
@@ -48,8 +48,8 @@ def distance_of_means(gap: float) -> float:
 class Asperities(NamedTuple):
     """The asperities of two rough lines.
 
-    `rms` is that of the summed heights in m, `wavelength` the longest wavelength in m, and `E_star` the contact modulus
-    in Pa.
+    `rms` is the rms value of the summed heights in m, `wavelength` the longest wavelength in m, and `E_star` the
+    contact modulus in Pa.
     """
 
     rms: float

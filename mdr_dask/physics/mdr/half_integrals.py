@@ -1,7 +1,7 @@
 """Matrices of the MDR transforms on graded panels, for functions that are a polynomial inside each panel.
 
 As functions of z = r^2, both transforms are Abel's half-integrals. Substitutions remove the square roots, and Gauss's
-rule then integrates them with no more than the rounding error.
+rule then integrates the remaining smooth functions with no more than the rounding error.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class Panels:
     `inner`: (1/pi) int_0^z u(z') / sqrt(z - z') dz'
     `full`: (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'
     `outer`: (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'
-    `slope`: u'(z), at the common end of two panels the slope in the left one
-    `weights`: weights of int_0^1 u dz
+    `slope`: u'(z); at the common end of two panels, this is the slope in the left panel
+    `weights`: weights of the nodes in int_0^1 u dz
     """
 
     mesh: Mesh

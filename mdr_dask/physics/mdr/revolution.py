@@ -182,7 +182,7 @@ def _piece(image: Image, place: float, derivative: int) -> float:
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
     """Return the profile of a table of radii and heights, pressed to a depth; all are in the same unit of length.
 
-    The radii begin at 0, and heights are counted from the first one.
+    The radii begin at 0, and heights are measured from the first height.
     """
     r, f = np.asarray(radius, dtype=float), np.asarray(height, dtype=float)
     check_table(r, f)

@@ -1,4 +1,4 @@
-"""The transforms of piecewise linear functions on a uniform grid, with the singular weights integrated exactly.
+"""The transforms of piecewise linear functions on a uniform grid; the singular integrals over a cell are exact.
 
 With the cell width h, the error of the inverse transform is proportional to h^2, and that of the forward transform to
 h^1.5. The error of the pressure is proportional to h and largest next to the axis. Unlike the panels of

@@ -258,7 +258,10 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return weights: the weighted sum of values at `times` is the derivative of their polynomial at times[0]."""
+    """Return one weight for each time.
+
+    The weighted sum of values at these times is the derivative at times[0] of the polynomial through the values.
+    """
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -271,7 +274,10 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return weights: the weighted sum of values at `times` is the value of their polynomial at `time`."""
+    """Return one weight for each of the `times`.
+
+    The weighted sum of values at these times is the value at `time` of the polynomial through the values.
+    """
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

@@ -166,7 +166,8 @@ def exact(
     found, rougher = solve(resolution), []
     if errors:
         rougher.append(solve(resolution._replace(rougher=1)))
-        with suppress(NotConvergedError):  # if this solution fails, the error is estimated from one difference
+        # if this solution fails, the error is estimated from one coarser solution only
+        with suppress(NotConvergedError):
             rougher.append(solve(resolution._replace(rougher=2)))
     contacts = {
         amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
@@ -176,7 +177,7 @@ def exact(
 
 
 class _Leg(NamedTuple):
-    """A part of an evolution: the equations, the moments, the tolerance of a step, and the energy dissipated before."""
+    """A part of an evolution. `before` is the energy that was dissipated before this part, divided by mu."""
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
@@ -270,8 +271,8 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
 def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
     """Return radii that the stick border has passed, the depths at these times, and the slope of the image.
 
-    The depths are in d0. The image at such a radius remains the depth at that time minus eta. The slope, between these
-    radii, is a function of position.
+    The depths are in d0. The image at such a radius remains the depth at that time minus eta. The slope of the image is
+    returned as a function of position.
     """
     places, depths = rising(path)
     radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
@@ -292,7 +293,8 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, (radii, reached, frozen_slope) = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
-    # between c and b, g = d' - eta in int_0^b g dx, where d' is the depth at which the border passed this radius
+    # between c and b, g = d' - eta in int_0^b g dx, where d' is the depth at the time when the border passed this
+    # radius
     annulus = float(np.trapezoid((reached - 1.0) / eta - 1.0, radii))
     load = float(problem.load or 0.0)
     depth = 1.0 + eta * (load + annulus) / border

@@ -1,6 +1,6 @@
 """The equations of one time step of partial slip and of gross slip, for `evolution.march`.
 
-In partial slip, squared radii are given as q = (r^2 - c^2) / (1 - c^2), depths as (d - 1) / eta, and worn depths
+In partial slip, squared radii are given as q = (r^2 - c^2) / (1 - c^2), depths as (d - 1) / eta, and worn depths are
 divided by eta. The unknowns are then of the order of one, even near full stick.
 """
 
@@ -83,7 +83,7 @@ class Past(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SlipMoment(Moment):
-    """A moment of partial slip.
+    """A contact in partial slip at one time.
 
     `path`, shape (2, k), holds the stick border and the depth at the moments at which the border moved; both vary
     linearly in between. `moved` is the rise of f_star along the path (see `PartialSlip`), at the nodes and in one more
@@ -147,7 +147,7 @@ class PartialSlip:
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return whether the slip zone has y >= 0 if the border moves, or s >= 0 if it does not move."""
+        """Return whether y >= 0 in the slip zone (if the border moves), or s >= 0 (if the border does not move)."""
         positive = unknowns[: self.size - 1] if self.border is None else self.slip(unknowns)
         return bool(np.min(positive) >= -tolerance)
 
@@ -294,8 +294,9 @@ class PartialSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities whose error is controlled in every step: s at the nodes, the depth, and a moving
-        border.
+        """Return the quantities whose error is controlled in every step.
+
+        They are s at the nodes and, under constant force, the depth and the position of a moving border.
         """
         weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
@@ -339,7 +340,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return border and depth at the points of a path at which the border is farther out than at all earlier ones."""
+    """Return border and depth at those points of a path where the border is farther out than at all earlier points."""
     furthest = np.maximum.accumulate(path[0])
     new = np.append(True, np.diff(furthest) > 0.0)
     return furthest[new], path[1, new]

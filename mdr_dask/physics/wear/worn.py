@@ -97,10 +97,10 @@ class Worn:
         return np.asarray(SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide)))
 
     def _distance(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the difference from the first coarser solution, or half of the difference from the second if that is
-        larger.
+        """Return the larger of two differences.
 
-        Both are used, because two solutions may agree by chance.
+        The first is the difference from the first coarser solution, the second is half of the difference from the
+        second coarser solution. Both are used, because two solutions may agree by chance.
         """
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
