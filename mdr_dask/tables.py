@@ -478,7 +478,7 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 def _ends_with_mean(cells: Cells, number: BoolArray) -> bool:
     """Return whether the last row is the mean of the rows above in all its numbers, and two or more columns vary."""
     varied = 0
-    for column in np.flatnonzero(number[-1, : cells.shape[1]]) if len(cells) > 2 else ():
+    for column in np.flatnonzero(number[-1, : cells.shape[1]]) if len(cells) > 3 else ():
         text, above = cells[-1, column], cells[:-1, column][number[:-1, column]].astype(np.float64)
         last_digit = float(f"1e{Decimal(text).as_tuple().exponent}")
         if not (above.size and np.isclose(float(text), above.mean(), rtol=1e-12, atol=last_digit / 2)):

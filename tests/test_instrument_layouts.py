@@ -60,9 +60,9 @@ def test_lines_below_the_numbers_are_named():
 
 
 def test_a_mean_without_a_label_is_left_out_and_named():
-    read = read_table("v [mm/s];mu\n1,0;0,5\n4,0;0,62\n\n2,5;0,56\n", "v.csv", FRICTION)
-    assert read["velocity"].tolist() == [1e-3, 4e-3]
-    assert "'line 5: the mean of the rows above'" in read.remark
+    read = read_table("v [mm/s];mu\n1,0;0,5\n4,0;0,62\n7,0;0,68\n\n4,0;0,60\n", "v.csv", FRICTION)
+    assert read["velocity"].tolist() == [1e-3, 4e-3, 7e-3]
+    assert "'line 6: the mean of the rows above'" in read.remark
 
 
 def test_pairs_of_columns_become_a_table_with_a_temperature():

@@ -76,7 +76,7 @@ def test_a_law_of_a_file_takes_many_points_and_refuses_to_extrapolate(tmp_path):
     assert mu.shape == error.shape == (100, 100)
     truth = SHAPES["friction"][0](force[:, None], velocity)
     assert np.mean(np.abs(mu - truth) <= error) > 0.95
-    with pytest.raises(DataError, match=r"expected velocity from 0.0001 m/s to 100 m/s, got 101 m/s"):
+    with pytest.raises(DataError, match=r"expected velocity from 100 um/s to 100 m/s, got 101 m/s"):
         found(force=1.0, velocity=[1.0, 101.0])
     with pytest.raises(DataError, match="expected force, velocity, got force"):
         found(force=1.0)
