@@ -576,8 +576,8 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
         if column.name not in taken:
             read[column.name], taken[column.name] = values, place
         elif not wrong and not np.allclose(values, read[column.name], rtol=AGREE, atol=0, equal_nan=True):
-            other = sheet.names[taken[column.name]]
-            what = f"column {column.name} is given twice, and {other!r} disagrees: delete one of the two"
+            both = f"{sheet.names[taken[column.name]]!r} and {sheet.names[place]!r}"
+            what = f"column {column.name} is given twice: {both} disagree: delete one of the two"
             problems.append(sheet.head.problem(place, what))
     lacking = [column.name for column in absent if column.needed]
     if lacking and not problems:
