@@ -58,7 +58,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is wider than the tolerance; False where an end of the interval is not finite."""
+    """Return which intervals are wider than the tolerance; False for an interval with an end that is not finite."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -117,12 +117,12 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of the series `name` on which the constants with too wide an interval depend.
+    """Return the cases of the series `name` that influence constants whose interval is too wide.
 
-    `wide` marks these constants: there is one constant for each combination of values along the dimensions of `wide`.
-    Each constant is fitted to all cases along the other dimensions of the series. Along each of these other dimensions,
-    neighbouring cases form groups. The results of one group at a time are shifted, and the fit is repeated. A case is
-    chosen if the constant depends on the group of the case along each of these dimensions.
+    `wide` marks these constants. The fit gives one constant for each combination of values along the dimensions of
+    `wide`. Each constant is fitted to all cases along the other dimensions of the series. Along each of these other
+    dimensions, neighbouring cases form groups. The results of one group at a time are shifted, and the fit is repeated.
+    A case is chosen if, along each of these dimensions, the shift of its group changes the constant.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -177,6 +177,6 @@ def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
 
 
 def _results(data: xr.Dataset) -> list[str]:
-    """Return the names of the outputs that have a value for each realisation, but not the names of their errors."""
+    """Return the names of the outputs that have a value for each realisation; errors of outputs are left out."""
     beside = {"status", *(array.attrs.get("ancillary_variables") for array in data.data_vars.values())}
     return [str(key) for key, array in data.data_vars.items() if key not in beside and "realisation" in array.dims]

@@ -18,9 +18,11 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: A law holds if the rms relative departure is at most this value, and the largest relative departure at most twice it.
+#: A law holds if the rms relative departure is at most this value, and the largest relative departure is at most twice
+#: this value.
 WITHIN = 0.05
-#: A law holds approximately if the rms relative departure is at most this value, and the largest at most twice it.
+#: A law holds approximately if the rms relative departure is at most this value, and the largest relative departure is
+#: at most twice this value.
 APPROXIMATE = 0.15
 #: Departures count against a law if scatter and errors alone would cause such departures with a probability below this.
 DOUBTFUL = 0.05
@@ -68,7 +70,10 @@ class Fit:
 
 
 def require(data: xr.Dataset, *names: str) -> None:
-    """Raise FitError if a study lacks one of these parameters, which a Kelvin body on a generated line has."""
+    """Raise FitError if a study lacks one of the parameters `names`.
+
+    A study of a Kelvin body on a generated line has all of these parameters.
+    """
     missing = [name for name in names if name not in data.variables]
     if missing:
         raise FitError(
@@ -122,8 +127,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p), which are exponents or logarithms of factors; `left` returns data
     minus law. If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by
-    the residuals, which widens the intervals. A constant is NaN if it is `undetermined` at the fitted or at the
-    `stated` constants.
+    the residuals, which widens the intervals. A constant is NaN if the data do not determine it (see `undetermined`),
+    near the fitted constants or near the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -164,8 +169,9 @@ def verdict(
 ) -> str:
     """Return a sentence on whether a law holds, from a stack of the relative departures of the data from the law.
 
-    `constants` is the number of constants fitted to these data. `where` describes a case in words. If `excluded`, the
-    interval of a fitted constant excludes the stated value; scatter then does not explain the departures.
+    `constants` is the number of constants fitted to these data. `where` describes a case in words. `excluded` means
+    that the interval of a fitted constant does not contain the stated value; the departures are then not due to
+    scatter.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
@@ -176,7 +182,7 @@ def verdict(
 
 
 def excludes(stack: FloatArray, count: int, stated: float) -> bool:
-    """Return whether the interval of a constant excludes a stated value."""
+    """Return whether a stated value lies outside the interval of a constant."""
     low, high = bootstrap.interval(stack, count)
     return bool(stated < low or stated > high)
 

@@ -125,12 +125,12 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     """Estimate the one to four unknowns of a grid study from measured points.
 
     The prior of an unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically. The
-    covariance of the points, which are normally distributed, has three parts: errors of measurement; scatter of the
-    rough lines, common to all points; and errors of grid and interpolation, of which one half is common to all points
-    and the other half is independent for each point.
+    points are normally distributed. Their covariance has three parts: errors of measurement; scatter of the rough
+    lines, common to all points; and errors of grid and interpolation. One half of the last part is common to all
+    points, the other half is independent for each point.
 
-    Without errors of measurement in the table, their size is unknown, and its logarithm has a uniform prior. The errors
-    are then either equal for all points, or proportional to the values.
+    If the table contains no errors of measurement, the size of these errors is unknown, and the logarithm of the size
+    has a uniform prior. The errors are then taken as either equal for all points, or proportional to the values.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)

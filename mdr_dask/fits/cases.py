@@ -1,4 +1,4 @@
-"""Functions that many fits use: arrays of the cases of a series, fits of laws to such arrays, and variables of results.
+"""Functions for many fits: arrays of the cases of a series, fits of laws to these arrays, and result variables.
 
 For stacks, see `mdr_dask.bootstrap`.
 """

@@ -144,9 +144,10 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return the kind of vertical factors for these columns, which are recognised by name or unit.
+    """Return the kind of vertical factors for these columns; columns are recognised by name or unit.
 
-    ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group; otherwise ``none``.
+    The kinds ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group. In all
+    other cases, the kind is ``none``.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:

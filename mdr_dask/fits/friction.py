@@ -145,7 +145,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Compare the largest friction over all velocities with two rms slopes: of the whole line, and in contact."""
+    """Compare the largest friction over all velocities with the rms slope of the line and with that in contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -176,8 +176,8 @@ def _plateau(data: xr.Dataset) -> Variables:
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
     """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
 
-    `height` is the stack of the largest mu divided by the rms slope. `flat` contains the indices of the cases on the
-    plateau.
+    `height` is a stack of the ratio of the largest mu to the rms slope of the line. `flat` contains the indices of the
+    cases on the plateau.
     """
     meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:

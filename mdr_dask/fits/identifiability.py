@@ -11,8 +11,8 @@ import numpy as np
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: An end of the axis of an unknown is *open* if ln(posterior density) at this end is less than `OPEN` below its
-#: maximum. For a normal density, an open end lies within two standard errors of the maximum.
+#: An end of the axis of an unknown is *open* if ln(posterior density) at this end is less than `OPEN` below the maximum
+#: of ln(posterior density). For a normal density, an open end lies within two standard errors of the maximum.
 OPEN = 2.0
 #: The axis cuts off the 95 % interval of an unknown if the density at an end of the axis exceeds 5 % of the maximum.
 CUT = float(np.log(20))

@@ -101,10 +101,10 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the values along an axis, in which missing values are interpolated, and the errors of all values."""
+    """Return the values along an axis after missing values were interpolated, and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    # the factor LEFT is divided out: a gap at a missing value is as wide as a gap at a value that the test leaves out
+    # without the factor LEFT: the gap at a missing value is as wide as the gaps in the test of `left_out_error`
     left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])

@@ -25,8 +25,8 @@ class Scale:
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
         """Return the scale for some numbers; it is linear if a number is not positive.
 
-        With `spread`, the scale is logarithmic if the numbers span more than a decade. Otherwise the numbers must
-        ascend, and the scale is the one on which they are more evenly spaced.
+        If `spread` is True, the scale is logarithmic if the numbers span more than a decade. If `spread` is False, the
+        numbers must ascend, and the scale is the one on which the numbers are more evenly spaced.
         """
         if numbers.min() <= 0:
             return cls(False)

@@ -174,8 +174,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # `fitted` may repeat the fit for shifted data, which have another number of rows; mu_1 of the first row is then
-        # used for all of them
+        # `fitted` may repeat the fit for shifted data with another number of rows; they all use mu_1 of the first row
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 

@@ -43,8 +43,8 @@ def master_curve(
     For the arguments see ``mdr-dask master-curve --help``. ``shift_factor`` and ``vertical_factor`` are the decades
     added to log10 of abscissa and ordinate, with ``_error`` (half width of the 68 % interval), ``_low`` and ``_high``
     (ends of the 95 % interval). If the curves differ in two parameters, log x becomes log x + a(v) + b(T), and
-    ``second_factor`` is b. If the reference lies between two groups, the factor there is that of the best law plus the
-    interpolated difference between the shift factors and this law.
+    ``second_factor`` is b. If the reference lies between two groups, the factor at the reference is that of the best
+    law plus the interpolated difference between the shift factors and this law.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)

@@ -33,7 +33,7 @@ _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: a pattern of standard deviations, and factors (`sizes`) by which it may be multiplied.
+    """Errors of measurement: a pattern of standard deviations, and factors (`sizes`) that may multiply the pattern.
 
     Without a pattern, the standard deviation of a point is the factor times the absolute value of its prediction.
     """
@@ -106,7 +106,7 @@ class Posterior(NamedTuple):
 
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
-    """Return the posterior density on cells of the unit cube for a uniform prior, from the function of `likelihood`."""
+    """Return the posterior density on cells of the unit cube, from the result of `likelihood` and a uniform prior."""
     width = 1.0 / START[unknowns]
     axis = (np.arange(START[unknowns]) + 0.5) * width
     places = np.stack([each.ravel() for each in np.meshgrid(*[axis] * unknowns, indexing="ij")], axis=1)
@@ -128,7 +128,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
     """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
 
-    If there are more than `most`, a random selection of them is divided.
+    If these are more than `most` cells, a random selection of `most` cells is returned.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

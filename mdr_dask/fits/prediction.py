@@ -161,8 +161,9 @@ def _fields(
 ) -> tuple[FloatArray, bool]:
     """Return, for every case, the numbers to interpolate; also return whether the means are replaced by logarithms.
 
-    Along the last axis are: the mean; 1 if the mean is missing; the scatter that is independent of other cases; the
-    error of grid and interpolation; and the modes of the scatter that is common to all cases.
+    The last axis contains, in this order: the mean; 1 where missing cases prevent interpolation, otherwise 0; the
+    scatter that is independent for each case; the error of grid and interpolation; and the modes of the scatter that is
+    common to all cases.
     """
     order = [*along, *unknowns]
     array = dataset[output]

@@ -136,7 +136,7 @@ def law_rate(number: float, hurst: float) -> float:
 
 
 def _passing_number(case: xr.Dataset) -> float:
-    """Return v_1 tau q_max: the relaxation time over the time in which the body slides by 1 / q_max."""
+    """Return v_1 tau q_max: the relaxation time divided by the time in which the body slides by 1 / q_max."""
     wavenumber = np.pi * one_value(case, "points") / one_value(case, "length")
     return one_value(case, "velocity") * one_value(case, "relaxation_time") * wavenumber
 
@@ -155,8 +155,8 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
     """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The error of mu includes the error of mu_2. Therefore the error of mu - mu_2 is the error of mu minus the error of
-    mu_2.
+    The grid error of mu in the store already includes that of mu_2. Therefore, the grid error of mu - mu_2 is the error
+    of mu minus that of mu_2.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T

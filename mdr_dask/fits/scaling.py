@@ -71,7 +71,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return two ratios: slope in contact over slope of the line, and mu over mu by eq. 3.12.
+    """Return two ratios: slope in contact divided by slope of the line, and mu divided by the value of eq. 3.12.
 
     The result is empty if the store lacks one of the required outputs.
     """
@@ -100,8 +100,8 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
     `fraction` is the length in contact divided by that of the line. Only waves that are shorter than the length in
-    contact count, and without such waves the result is NaN. The shortest wave is twice as long as the distance between
-    neighbouring `points` of the line.
+    contact count; if there are no such waves, the result is NaN. The shortest wave is twice as long as the distance
+    between neighbouring `points` of the line.
     """
     power = 2 * (1 - hurst)
     # wave numbers 2 pi / L_cont and q_max, both divided by 2 pi / L
@@ -243,7 +243,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 def _collapse(data: xr.Dataset) -> Variables:
     """Shift the curves of friction against velocity onto one common curve.
 
-    There is one curve for each load. It ends at its largest friction.
+    There is one curve for each load. Each curve ends at its largest friction.
     """
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns

@@ -17,7 +17,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError, distinguishable
 
-#: A study has enough points if the half width of the interval of each index is at most this.
+#: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
 #: Smallest number of points from which an index is computed.
 FEWEST = 16

@@ -144,7 +144,7 @@ def _fit(
     freedom = int(known.sum()) - guess.size
     if freedom < 1:
         raise FitError(
-            f"the law {name} needs more than {guess.size} shift factors beside the reference, got {known.sum()}"
+            f"the law {name} needs more than {guess.size} shift factors besides the reference, got {known.sum()}"
         )
     values, vectors = np.linalg.eigh(covariance[np.ix_(known, known)])
     values = np.maximum(values, 1e-12 * values.max())

@@ -258,7 +258,7 @@ def _merged(
 
 
 def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """Return the first and the last group of each series of marked steps; step k leads from group k to k + 1."""
+    """Return the first and the last group of each run of adjacent marked steps; step k is from group k to k + 1."""
     edges = np.diff(np.concatenate([[0], steps.astype(int), [0]]))
     ends = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     return tuple((float(groups[first]), float(groups[last])) for first, last in ends)

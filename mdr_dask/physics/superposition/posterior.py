@@ -4,10 +4,10 @@ Each channel c of a curve k (such as storage and loss modulus of one temperature
 
     y_c(x) = Q_c(x + h_k) - v_k + noise_c,
 
-with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline whose second
-differences are normally distributed (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89), and so are the offsets. The
-density is integrated over spline coefficients and offsets in closed form; it depends only on the shifts and a few
-scales.
+with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline. The prior of its
+second differences is a normal distribution (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89), and so is the prior
+of the offsets. The density is integrated over spline coefficients and offsets in closed form; it depends only on the
+shifts and a few scales.
 """
 
 from __future__ import annotations
@@ -61,9 +61,10 @@ class Curves:
 
     The origin of `x` is such that the smallest ``x + shift`` is near zero. `member` is the index of the curve of each
     point, and `height` the median height of a curve in each channel. `splines` is the number of spline coefficients of
-    each channel. `offset` is the prior of the standard deviation of the vertical offsets: its median, decades, and the
-    standard deviation of its natural logarithm; None for curves without offsets. If `drifting`, the offsets change from
-    curve to curve by steps: a mean step plus a scatter, whose prior standard deviations have the ratio `TREND`.
+    each channel. `offset` describes the prior of the standard deviation s of the vertical offsets: the median of s,
+    decades, and the standard deviation of ln s. It is None for curves without offsets. If `drifting` is True, the
+    offsets change from curve to curve by steps. A step is a mean step plus a scatter; the prior standard deviation of
+    the mean step is `TREND` times that of the scatter.
     """
 
     x: FloatArray
@@ -181,7 +182,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     change = share[:, None] * (near[:, :, None] - bend[..., None]) * (apart / REACH**2)[:, None]
     turn = np.einsum("wc,wcp->wp", weight, linear.tilt - left * linear.slope)
     by_place = np.einsum("wcj,wcjk->wk", by_bend, change)
-    # at the mean coefficients, minus the exponent of the density is half the sum of weight * residual * ordinate
+    # at the mean coefficients, the exponent of the density is minus half the sum of weight * residual * ordinate
     energy = 0.5 * linear.log_determinant + 0.5 * np.sum(weight * np.sum(left * curves.y, axis=2), axis=1)
     energy += np.sum(bend, axis=(1, 2)) - 0.5 * points * np.sum(np.log(weight), axis=1)
     gradient = np.zeros_like(rows)

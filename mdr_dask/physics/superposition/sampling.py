@@ -40,8 +40,9 @@ SCAN = 81
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
-    For each pair of neighbouring curves, many values of the step between their two shifts are tried. Mean and variance
-    of the step, weighted with the density of the pair, are then combined with the prior of the shifts.
+    For each pair of neighbouring curves, many values of the step between their two shifts are tried. The tried values,
+    weighted with the density of the pair, give the mean and the variance of the step. Both are then combined with the
+    prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, SCAN)
     means, variances = [], []

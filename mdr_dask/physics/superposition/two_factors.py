@@ -19,9 +19,9 @@ class TwoShifts:
     """Factors ``h(v, T) = a(v) + b(T)`` and the merged curve.
 
     `first` contains a, `second` contains b, and both contain the same merged curve. `chi_squared` is the reduced
-    chi-squared of the differences between the factor of each curve and the sum a + b; if it is above one, the errors of
-    the factors are multiplied by its square root. `probability` is the probability of a chi-squared at least as large
-    if every factor is really a sum; it is 1 if no degree of freedom is left.
+    chi-squared of the differences between the factor of each curve and the sum a + b; if `chi_squared` is above one,
+    the errors of the factors are multiplied by the square root of `chi_squared`. `probability` is the probability of a
+    chi-squared at least as large if every factor is really a sum; it is 1 if no degree of freedom is left.
     """
 
     first: Superposition

@@ -19,7 +19,7 @@ NONE = 2.0  # result of `summit` if the cell has no maximum
 # a cubic cell rises above its higher end by at most this factor times the sum of two slopes: the upward slope at its
 # start and the downward slope at its end
 STEEPEST_RISE = 4 / 27
-UNRESOLVED = 0.5  # relative difference of the mean squared slopes at nodes and over cells of an unresolved line
+UNRESOLVED = 0.5  # a line is unresolved if its mean squared slopes at nodes and over cells differ by this fraction
 
 
 class CubicLine(NamedTuple):
@@ -129,7 +129,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
-    between = 3 * rise - first - last  # no extreme inside if this and the slopes at both ends have the same sign
+    between = 3 * rise - first - last  # no extreme inside if `between` and the slopes at both ends have the same sign
     if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)
@@ -231,8 +231,9 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
-    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The
-    resulting change of the first cell is distributed over the other cells, so that the sum remains exact.
+    The first cell is an exception: it keeps the integral of its polynomial, because a period begins and ends inside
+    this cell. The difference between both integrals of the first cell is distributed over the other cells, so that the
+    sum remains exact.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

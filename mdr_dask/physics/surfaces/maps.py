@@ -38,7 +38,7 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return the points that deviate from their neighbours by more than `FAR` standard deviations, along x and along y.
+    """Return the points that deviate from their neighbours by more than `FAR` standard deviations along both axes.
 
     The standard deviation is estimated from the median of the deviations.
     """
@@ -215,7 +215,7 @@ class MapSpectrum:
         """
         there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # number only the octaves that contain rings
+        _, octave = np.unique(octave, return_inverse=True)  # consecutive indices of the octaves with rings
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2

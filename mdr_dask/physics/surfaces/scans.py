@@ -20,7 +20,7 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # number of bins per decade of the wave number
 BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
-NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this; it is -1 or less for roughness
+NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q exceeds this; for roughness, it is -1 or less
 NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
@@ -81,7 +81,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the bins up to the first place at which the spectrum falls more steeply than `STEEPEST`; it ends there."""
+    """Return the bins before the first fall that is steeper than `STEEPEST`; such a fall is the end of the spectrum."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))

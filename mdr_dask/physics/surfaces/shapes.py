@@ -87,7 +87,7 @@ class RoundedCone:
     blend: float
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height at every x, and the slopes to the left and to the right of x, which are equal."""
+        """Return the height at every x, and the slopes to the left and to the right of x (both are equal here)."""
         place, b = np.abs(x), self.blend
         outer = np.maximum(place, b)
         root = np.sqrt((outer - b) * (outer + b))

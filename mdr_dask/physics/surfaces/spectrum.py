@@ -59,8 +59,8 @@ class Spectrum:
     def line(self, length: float, modes: int) -> FloatArray:
         """Return the amplitudes A_k, m, of the harmonics q_k = 2 pi k / L of the MDR line of the length L.
 
-        A_k = 2 sqrt(C1D(q_k) 2 pi / L), with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height and the
-        full rms gradient of the surface.
+        A_k = 2 sqrt(C1D(q_k) 2 pi / L), with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height of the
+        surface, and its rms slope equals the rms gradient of the surface.
         """
         q = 2 * np.pi / length * np.arange(1, modes + 1)
         amplitude: FloatArray = 2 * np.sqrt(np.pi * q * self.at(q) * (2 * np.pi / length))
@@ -113,7 +113,7 @@ class Spectrum:
         return math.sqrt(2 * np.pi * self._moment(3))
 
     def _moment(self, order: int) -> float:
-        """Return the integral of q^order C2D over q, which is exact for the power laws between points."""
+        """Return the integral of q^order C2D over q; it is exact, because C2D is a power law between points."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
         # if v is linear, the integral of exp(v) is the width times the logarithmic mean of exp(v) at both ends

@@ -22,9 +22,9 @@ Piece = tuple[float, float, float, float]
 def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     """Return the coefficients of the least-squares spline of a sum of waves with at least two nodes per shortest wave.
 
-    Every wave, given by half its complex amplitude, is multiplied by a factor: the Fourier transform of the B-spline,
-    divided by the sum of the squares of this transform over all aliases of the wave (Unser, IEEE Signal Process. Mag.
-    16 (1999) 22).
+    `waves` contains half of the complex amplitude of every wave. Each entry is multiplied by a factor. The factor is
+    the Fourier transform of the B-spline, divided by the sum of the squares of this transform over all aliases of the
+    wave (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 

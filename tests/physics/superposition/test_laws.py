@@ -90,5 +90,5 @@ def test_laws_refuse_groups_they_are_not_made_for():
         fit_power(np.array([-1.0, 1.0]), np.zeros(2), np.zeros((2, 2)), 0)
     with pytest.raises(FitError, match="absolute temperatures"):
         fit_arrhenius(np.array([-1.0, 1.0]), np.zeros(2), np.zeros((2, 2)), 0)
-    with pytest.raises(FitError, match="needs more than 1 shift factors beside the reference, got 0"):
+    with pytest.raises(FitError, match="needs more than 1 shift factors besides the reference, got 0"):
         fit_power(np.array([1.0, 2.0]), np.zeros(2), np.zeros((2, 2)), 0)
