@@ -35,9 +35,9 @@ class Fit:
     `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
     realisation, ...), and all scalar parameters as coordinates. `compute` returns constants with the ends of their 95 %
     intervals (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``, with units in
-    the attrs. If `apart`, each series is fitted separately: `compute` takes one series at a time. `constants` names the
-    constants with an interval, which a campaign may name in ``until``. If these names depend on the campaign,
-    `constants` is a function of the campaign.
+    the attrs. If `apart`, each series is fitted separately: `compute` takes one series at a time. `constants` contains
+    the names of all constants that have an interval; a campaign may use these names in ``until``. If these names depend
+    on the campaign, `constants` is a function of the campaign.
     """
 
     name: str

@@ -25,7 +25,7 @@ LEAST_JUMP = 3.0
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of numbers with a row of names and an optional row of units, which become ``attrs["units"]``."""
+    """Read a table of numbers with a row of names and an optional row of units, stored in ``attrs["units"]``."""
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")

@@ -155,8 +155,8 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
     """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The grid error of mu in the store already includes that of mu_2. Therefore, the grid error of mu - mu_2 is the error
-    of mu minus that of mu_2.
+    The grid error of mu in the store already includes that of mu_2. Therefore, the grid error of mu - mu_2 is the
+    difference between these two errors.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T

@@ -24,8 +24,8 @@ GAS_CONSTANT = 8.31446261815324
 class LinearSolid:
     """A linear viscoelastic solid: a spring, Prony terms and a dashpot in parallel.
 
-    Moduli are shear moduli in Pa, `times` are the ascending and distinct relaxation times of the Prony terms in s, and
-    `viscosity` is that of the dashpot in Pa s.
+    Moduli are shear moduli in Pa. `times` contains the relaxation times of the Prony terms in s, ascending and
+    distinct. `viscosity` is the viscosity of the dashpot in Pa s.
     """
 
     static_modulus: float

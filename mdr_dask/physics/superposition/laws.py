@@ -69,7 +69,7 @@ def fit_wlf(
 ) -> ShiftLaw:
     """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)`` to temperatures in K.
 
-    The fitted constants are c1 / c2 and 1 / c2 at the anchor, which remain finite if the factors are linear in
+    The numbers c1 / c2 and 1 / c2 at the anchor are fitted, because they remain finite if the factors are linear in
     temperature. For a reference that is higher than the anchor by dT, ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])

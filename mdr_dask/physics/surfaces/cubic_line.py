@@ -88,8 +88,8 @@ class Cells(NamedTuple):
 
     A periodic line starts in the cell of its highest point. Heights are relative to this point: under light loads, only
     points slightly below it matter, and their small depths must not be lost to rounding. `peak` is the largest height
-    in each cell; `mean` and `stretch` are the integrals of the height and of the squared slope over each cell. `start`
-    is the position of the highest point in cell 0, where a period begins, and `top` is its height.
+    in each cell; `mean` and `stretch` are the integrals of the height and of the squared slope over each cell. A period
+    begins at the highest point: `start` is the position of this point in cell 0, and `top` is its height.
     """
 
     height: FloatArray

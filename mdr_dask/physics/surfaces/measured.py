@@ -45,8 +45,8 @@ def measured_line(
     """Turn positions and heights of a recorded line, m, into one period of a line with uniform spacing.
 
     The length of the period is the number of points times the mean spacing. At both ends, a cosine window reduces the
-    heights towards their mean; `taper` is the fraction of the line that is reduced: with 0.1, it is 5 % of the line at
-    each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit.
+    heights towards their mean; `taper` is the fraction of the line that the window changes: 0.1 means 5 % of the line
+    at each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit.
     """
     x, z = _ordered(position, height)
     steps = np.diff(x)

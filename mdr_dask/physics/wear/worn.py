@@ -36,7 +36,7 @@ class Worn:
     Parameters
     ----------
     contact_radius : float
-        Radius of the wear scar: beyond it f = f0. In an exact evolution it is the contact radius a as well.
+        Radius of the wear scar: beyond it f = f0. In an exact evolution, the contact radius a equals this radius.
     stick_border : float
         Radius up to which the contact sticks; 0 in gross slip.
     depth, normal_force : float
@@ -46,8 +46,8 @@ class Worn:
     height, image, pressure : callable, array -> array
         f(r), g(x) and p(r), for any position.
     energy_volume : float
-        The dissipated energy divided by mu, in the unit of volume. According to the wear law, it equals the wear
-        volume. NaN if it is unknown.
+        The dissipated energy divided by mu, in the unit of volume. According to the wear law, this volume equals the
+        wear volume. It is NaN if it is unknown.
     rougher : tuple of Worn
         One or two coarser solutions of the same contact. The errors are estimated from the differences between this
         solution and the coarser ones.
