@@ -84,8 +84,8 @@ _SYNONYMS = {
     "alpha": ("pressure_viscosity",),
     "slip": ("slide_roll_ratio",),
 }
-#: For some names that a user may write: the text that follows the suggested name in the message. The text states how
-#: the suggested quantity differs from the quantity that the user named.
+#: For some names that a user may write, the message adds this text to the suggested name. It states how the suggested
+#: quantity differs from the quantity that the user named.
 _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead of a pressure"}
 
 
@@ -100,7 +100,7 @@ def similar(word: Any, known: Sequence[str]) -> str:
 
     folded = {name.casefold(): name for name in known}
     typed = str(word).casefold()
-    quantity = typed.rpartition("_")[2]  # the last word of a compound name, such as roller_diameter
+    quantity = typed.rpartition("_")[2]  # the last word of a compound name: diameter in roller_diameter
     synonyms = [name for name in _SYNONYMS.get(quantity, ()) if name in folded]
     alike = get_close_matches(typed, list(folded), n=1)
     if synonyms and quantity in _DIFFERENCES:

@@ -58,7 +58,8 @@ class Column:
     """The description of a column that a table may have. The table may also use one of the `SYNONYMS` of its name.
 
     The SI `unit` is ``"1"`` for pure numbers. Values must be greater than `above` and not smaller than `least`, in SI.
-    `given_unit` is used if the table states no unit; without it, the table must state the unit of a quantity.
+    `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of every
+    column that does not contain pure numbers.
     """
 
     name: str
@@ -112,7 +113,10 @@ def is_called(heading: str, *names: str) -> bool:
 
 
 def nearest(heading: str, names: Sequence[str]) -> str:
-    """Return a hint with a name that is similar to a heading or has a word in common with it, or an empty text."""
+    """Return a hint with a name that is similar to a heading, or else with a name that has a word in common with it.
+
+    The hint is empty if there is no such name.
+    """
     words = {word for word in plain(heading).split() if len(word) > 2}
     common = [name for name in names if any(words & set(plain(each).split()) for each in _names_of(name))]
     return similar(heading, names) or (f" (did you mean {common[0]!r}?)" if common else "")
@@ -121,7 +125,8 @@ def nearest(heading: str, names: Sequence[str]) -> str:
 def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading: ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    Text in square brackets is always a unit, any other text only if it looks like one: not F in ``force (F)``.
+    Text in square brackets is always a unit. Any other text is a unit only if it looks like one and is not a symbol of
+    the quantity: F in ``force (F)`` is the symbol of the force.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -133,7 +138,10 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column that a name means, or None, and its unit, which may be part of the name: ``v_mm_s``."""
+    """Return the column that a name means, and its unit, which may be part of the name: mm/s in ``v_mm_s``.
+
+    The column is None if the name means none of the `columns`.
+    """
     fitting = [column for column in columns if column.holds(name)]
     if fitting:
         return next((column for column in fitting if fits(unit, column)), fitting[0]), unit
@@ -144,7 +152,7 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             for column in columns:
                 if column.holds(" ".join(words[:count])) and fits(joined, column):
                     return column, joined
-    written = _BRACKETED.fullmatch(name)  # the unit in the brackets may be unknown
+    written = _BRACKETED.fullmatch(name)  # a text in brackets that is no known unit is still part of the name
     return match(written[1], written[3], columns) if written and not unit else (None, unit)
 
 
@@ -158,7 +166,7 @@ def fits(unit: str, column: Column) -> bool:
 
 
 def factors(unit: str, wanted: str) -> tuple[float, float, float]:
-    """Return p, q and z: a number x in a unit is p (q x + z) in the SI unit `wanted`.
+    """Return the numbers p, q and z that convert a unit to SI: x in this unit is p (q x + z) in the SI unit `wanted`.
 
     If an angular frequency is wanted, p is 2 pi for Hz and 1/min (revolutions per minute); 1/s counts as rad/s.
     """

@@ -65,12 +65,12 @@ def check(source: Source) -> Summary:
     Returns
     -------
     Summary
-        Counts, bytes and seconds; printed, it shows the lines of ``mdr-dask check``.
+        Counts of cases and results, bytes and seconds. ``print`` shows the lines of ``mdr-dask check``.
 
     Raises
     ------
     CampaignError
-        With all problems.
+        If the campaign has problems. The error lists all of them.
 
     Examples
     --------
@@ -407,7 +407,7 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
         return store.datasets(str(study))
     for data in found.values():
         if "status" not in data or "realisation" not in data["status"].dims:
-            kept = "with its status and realisations (isel(realisation=[0]) keeps one)"
+            kept = "with its status and realisations (isel(realisation=[0]) keeps a single realisation)"
             raise DataError(f"expected a study as returned by run or open_study, {kept}, got a Dataset without them")
     return found
 

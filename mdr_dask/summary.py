@@ -67,9 +67,10 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
 
 
 def _defaults(campaign: Campaign) -> list[str]:
-    """Return names and values of the parameters that have an effect but are not in the campaign file, except zeros.
+    """Return names and values of the parameters that have an effect but are not in the campaign file.
 
-    If only some series use a default, the names of these series follow in brackets.
+    Parameters whose default is zero, false or empty are left out. If only some series use a default, the names of these
+    series follow in brackets.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:

@@ -1,7 +1,7 @@
 """Read tables in the forms in which people and instruments write them.
 
-`decoded` makes text of a file, `read_sheet` finds its names, units and numbers, `match` of `mdr_dask.headings` compares
-the names with the columns of a caller, and `read_table` converts the numbers to SI.
+`decoded` returns the content of a file as text. `read_sheet` finds the names, units and numbers in a text. `match` of
+`mdr_dask.headings` compares the names with the columns that a caller expects. `read_table` converts the numbers to SI.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ NO_ROWS = "expected a line of names and at least one line of values"
 
 #: A name of common logarithms: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
-#: Marks between thousands, beside the point or comma that is not the decimal mark.
+#: Characters that may separate thousands, in addition to the point or comma that is not the decimal mark.
 _GROUPS = "'\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"
 #: Patterns of a number, indexed by its decimal mark; the other mark may separate thousands.
 _DECIMALS = {
@@ -98,10 +98,11 @@ class TableError(DataError):
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A table as text: `cells` has the shape (rows, columns) and decimal points, `lines` the line of each row.
+    """A table as text.
 
-    `names` and `units` are as written, and empty if they are missing. `head` is the line of names, or else the first
-    row. `notes` are the first cells of the lines of text below the numbers.
+    `cells` has the shape (rows, columns), and its numbers have decimal points. `lines` contains the line of each row.
+    `names` and `units` are as written, and empty if the table lacks them. `head` is the line of names, or the first row
+    of numbers if there are no names. `notes` are the first cells of the lines of text below the numbers.
     """
 
     source: str
@@ -123,7 +124,7 @@ class Read(dict[str, FloatArray]):
     """The columns that were read from a table, by `Column.name`, in SI.
 
     `headings` are the names as written. `remark` names the columns and lines of the table that were not used. `unused`
-    are units and numbers, as written, of the columns that were not used, by name.
+    contains, by name, the unit as written and the numbers of each column that was not used.
     """
 
     headings: Mapping[str, str] = {}
@@ -143,7 +144,7 @@ def decoded(content: bytes, source: str) -> str:
         return _workbook(content, source)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace")
-    if content[1:2] == b"\0" or content[:1] == b"\0":  # without a byte-order mark
+    if content[1:2] == b"\0" or content[:1] == b"\0":  # UTF-16 without a byte-order mark
         return content.decode("utf-16-le" if content[:1] != b"\0" else "utf-16-be", errors="replace")
     try:
         return content.decode("utf-8-sig")
@@ -176,7 +177,10 @@ def _workbook(content: bytes, source: str) -> str:
 
 
 def _of_workbook(cell: object) -> str:
-    """Return a cell as text on one line. A text such as ``30,0`` gets a decimal point, as the numbers of a workbook."""
+    """Return a cell as text on one line.
+
+    A decimal comma in a text such as ``30,0`` becomes a decimal point, because numbers of a workbook have one.
+    """
     text = " ".join(str(cell).split())
     is_decimal = re.fullmatch(_DECIMALS[","], text) and not re.fullmatch(_DECIMALS["."], text)
     return text.replace(".", "").replace(",", ".") if isinstance(cell, str) and is_decimal else text
@@ -190,7 +194,7 @@ def _lines(text: str) -> list[Line]:
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
         if line.startswith(SHEET):
             sheet, before = line.removeprefix(SHEET), number
-        elif line.strip(" ,;\t-=_+|"):  # neither empty nor a ruled line
+        elif line.strip(" ,;\t-=_+|"):  # neither empty nor a line of dashes
             lines.append(Line(number - before, line, sheet))
     return lines
 
@@ -231,9 +235,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     """Find the names, the units and the lines of numbers of a table.
 
     Text above the names and below the numbers is left out. A table may consist of several blocks of numbers, each below
-    the same line of names. Temperatures above the blocks become a further column. Pairs of columns with a temperature
-    above each pair become three columns. If cells may be words, `is_name` returns whether a text is the name of a
-    column.
+    the same line of names. If a temperature is stated above each block, the temperatures become a further column. If
+    the table consists of pairs of columns with a temperature above each pair, it becomes a table of three columns. For
+    a table whose cells may be words, the caller gives `is_name`, which returns whether a text is the name of a column.
     """
     grid = _grid(source, _lines(text))
     head = _head_of_words(grid, is_name) if is_name else _head(grid)
@@ -262,9 +266,10 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """The cells of a text as an array, and what they contain. Short lines are filled up with empty cells.
+    """The cells of a text as an array, and masks of the cells that are filled, numbers or words.
 
-    `length` is the number of cells of each line. A `word` is neither a number nor a mark of a missing number.
+    `length` is the number of cells of each line, before short lines are filled up with empty cells. A `word` is neither
+    a number nor a mark of a missing number.
     """
 
     source: str
@@ -287,7 +292,7 @@ def _further(count: int) -> str:
 
 
 def _grid(source: str, every: Sequence[Line]) -> _Grid:
-    """Split lines into cells. A comment counts only if it contains the names of the columns."""
+    """Split lines into cells. Comments are left out, unless they contain the names of the columns."""
     texts = [line for line in every if line.text.lstrip()[0] not in COMMENT]
     if not texts:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
@@ -311,9 +316,10 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
 
 
 class _Head(NamedTuple):
-    """The positions of names, units and labels of pairs of columns, and masks of the numeric columns and lines.
+    """The lines of the names, of the units and of the labels above pairs of columns; None if there is no such line.
 
-    The numbers begin at or below the line `begin`.
+    `numeric` is a mask of the columns of numbers, and `data` a mask of the lines of numbers. The numbers begin at or
+    below the line `begin`.
     """
 
     names: int | None
@@ -325,10 +331,11 @@ class _Head(NamedTuple):
 
 
 def _head(grid: _Grid) -> _Head:
-    """Find the names and units in the lines of text above the numbers that have as many cells as most lines.
+    """Find the names and units in the lines of text above the numbers.
 
-    If a line of units follows the names, the line above the last line of units contains the names. Otherwise the last
-    line of text contains the names, and the line above may contain the units.
+    Only lines with as many cells as most lines of numbers count. If there is none, the last line above contains the
+    names. If a line of units follows the names, the names are in the line above the last line of units. Otherwise the
+    names are in the last line, and the units may be in the line above it.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -336,7 +343,7 @@ def _head(grid: _Grid) -> _Head:
         grid.require([len(grid.cells) - 1], 0, NO_ROWS)
     begin = int(full[0])
     above = [row for row in range(begin) if not data[row]]
-    if not above and begin + 2 < data.size and not data[begin + 1]:  # numbers above the names of pairs of columns
+    if not above and begin + 2 < data.size and not data[begin + 1]:  # the numbers are labels of pairs of columns
         above, begin = [begin, begin + 1], begin + 2
     if not above:
         return _Head(None, None, None, begin, numeric, data)
@@ -355,10 +362,10 @@ def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     A column is numeric if it contains numbers in at least half of the lines of the most frequent length. A line
     contains numbers if at least half of its filled cells in these columns are numbers or marks of missing numbers. A
     line that begins with a word is text if the word is in a numeric column, or if less than half of the columns are
-    filled (exactly half, if the line is shorter than most lines).
+    filled. In a line that is shorter than most lines, exactly half is too few as well.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
-    mostly = mostly if mostly.any() else grid.number.any(axis=1)  # the table has more words than numbers
+    mostly = mostly if mostly.any() else grid.number.any(axis=1)  # every line has more words than numbers
     lengths = Counter(grid.length[mostly].tolist() or [0])
     width = max(lengths, key=lambda each: (lengths[each], each))
     numeric = np.zeros(width, dtype=bool)
@@ -421,7 +428,7 @@ def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
 
 
 def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names and the units of the columns; a line of units precedes the unit in a name."""
+    """Return the names and the units of the columns. A line of units takes precedence over units in the names."""
     if head.names is None:
         return (), ("",) * head.numeric.size
     parts = [split_unit(name) for name in grid.cells[head.names][: grid.length[head.names]]]
@@ -433,7 +440,7 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
     """Raise TableError if a line lacks a number, or has more cells than there are names."""
     first = grid.lines[rows[0] if head.names is None else head.names]
-    blanks = width > head.numeric.size and first.separator == BLANKS  # a blank inside a name looks like a separator
+    blanks = width > head.numeric.size and first.separator == BLANKS  # a blank inside a name separates two cells
     wrong = [
         row
         for row in rows
@@ -451,7 +458,7 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
     """Return the cells of lines with decimal points and without marks between thousands.
 
-    All numbers must have one decimal mark; otherwise TableError is raised.
+    If some numbers have a decimal point and others a decimal comma, TableError is raised.
     """
     cells, number = grid.cells[rows], grid.number[rows]
     texts: list[str] = cells[number].tolist()
@@ -476,7 +483,10 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 
 
 def _ends_with_mean(cells: Cells, number: BoolArray) -> bool:
-    """Return whether the last row is the mean of the rows above in all its numbers, and two or more columns vary."""
+    """Return whether the last row contains the means of the rows above.
+
+    Each of its numbers must be the mean of its column, and at least two of these columns must not be constant.
+    """
     varied = 0
     for column in np.flatnonzero(number[-1, : cells.shape[1]]) if len(cells) > 3 else ():
         text, above = cells[-1, column], cells[:-1, column][number[:-1, column]].astype(np.float64)
@@ -510,7 +520,7 @@ def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
 def _are_units(row: Sequence[str]) -> bool:
     """Return whether at least half of the words of a line are units, or all of them are in square brackets."""
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
-    # a text such as "10 mm" is a value of a table with words, but "10^3 um^3" is a unit
+    # a text such as "10 mm" is a value and not a unit, but "10^3 um^3" is a unit
     texts = [text for text in filled if re.match(r"(?!\d)|10\s*[\^⁰¹²³⁴-⁹]|1e", text)]
     known = sum(is_unit(text.strip("[](){}<> ")) for text in texts)
     return bool(filled) and (2 * known >= len(filled) or all(re.fullmatch(r"\[.*\]", text) for text in filled))
@@ -519,8 +529,9 @@ def _are_units(row: Sequence[str]) -> bool:
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
     """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
 
-    The meaning is one of `columns`, or None. A table without names has these `columns` in this order. A needed column
-    may have any name if it is the only one of its dimension, both in the table and among the `columns`.
+    The meaning is one of `columns`, or None. In a table without names, the meanings are `columns` in this order. A
+    needed column that has none of the known names is recognised by its dimension, if only one unknown column of the
+    table and only one of `columns` have this dimension.
     """
     if not sheet.names:
         count = len(sheet.units)

@@ -170,7 +170,7 @@ def unit_behind(value: str) -> str:
 
 
 def spelt(value: str) -> str:
-    """Return a hint for a text that is not a number: to use a decimal point, or how to write lists and ranges."""
+    """Return a hint for a text that is not a number: how to write a decimal point, a list or a range."""
     if _THOUSANDS.fullmatch(value.strip()):
         return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
     if _COMMA.match(value):
@@ -217,7 +217,7 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
 
 
 def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a quantity and its limits for a reader, with as many digits as distinguish them."""
+    """Return a quantity and its limits as texts, with as many digits as are needed to distinguish them."""
     return distinguishable(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
 
 
@@ -240,8 +240,8 @@ _FAR = 3.0
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
-    A quantity is doubtful if it differs from the first of the `usual` values by more than 3 decades. Any number is
-    doubtful if the unit of one of the usual values brings it nearer to the first.
+    A number with a dimension is doubtful if it differs from the first of the `usual` values by more than 3 decades. Any
+    number is doubtful if it would be nearer to the first usual value in the unit of one of the usual values.
     """
     if value == 0:
         return False
@@ -254,13 +254,13 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     """Return a number with the unit in which it was probably meant, or an empty text.
 
-    Of the units of the usual values, the one that brings the number nearest to the first of them is used, if the
-    difference is at most 3 decades.
+    Among the units of the `usual` values, this is the unit that brings the number nearest to the first usual value. The
+    text is empty if the number then still differs from this value by more than 3 decades.
     """
     found = {}
     for each in usual:
         meant = f"{value:g} {unit_behind(each)}"
-        with suppress(ValueError):  # the converted number may be too large
+        with suppress(ValueError):  # raised if the converted number is too large
             found[meant] = _decades(to_si(meant, unit), unit, usual[0])
     nearest = min(found, key=lambda meant: found[meant], default="")
     return nearest if nearest and found[nearest] <= _FAR + 1e-9 else ""
@@ -272,7 +272,7 @@ def _decades(value: float, unit: str, usual: str) -> float:
 
 
 def example_unit(unit: str) -> str:
-    """Return a common unit for quantities of a SI unit: MPa for Pa."""
+    """Return a common unit of the quantity that has a given SI unit: MPa for Pa."""
     return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
 
 
@@ -372,7 +372,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
     found = _FACTOR.match(text)
     number = re.sub(r"^10\s*\^\s*", "1e", found[1]) if found else "1"
     unit = text[found.end() :] if found else text
-    unit = re.sub(r"^(HV|HBW?)\s?\d+([.,/]\d+)*$", r"\1", unit)  # hardness with the load of the test, such as HV10
+    unit = re.sub(r"^(HV|HBW?)\s?\d+([.,/]\d+)*$", r"\1", unit)  # the number after a hardness is the test load: HV10
     unit = unit.replace("−", "-").replace("·", " ").replace("microns", "micron")
     unit = re.sub(r"(?<=[A-Za-zμ])\^?\{?(-?\d{1,2})\}?(?!\d)", r"^\1", unit)
     unit = in_degrees(unit)
@@ -381,7 +381,10 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint with the known unit of nearest spelling, if `unit` is given among units with its dimension."""
+    """Return a hint with the known unit whose spelling is nearest to a word.
+
+    If `unit` is given, only known units of the same dimension are considered.
+    """
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"

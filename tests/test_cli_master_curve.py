@@ -61,14 +61,14 @@ def test_factors_and_merged_curve_are_written_and_kept_results_are_recognised(tm
     assert "the law wlf deviates from the factors by" in printed.err
     assert "shifted: E_relax; a modulus: b_T" in printed.err
     assert main(["master-curve", str(other), "--vertical", "free"]) == 2
-    assert "is a result of --keep, for which only --reference can be changed" in capsys.readouterr().err
+    assert "was written by --keep: only --reference can be changed" in capsys.readouterr().err
 
 
 def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):
     path = tmp_path / "other.json"
     path.write_text("{}")
     assert main(["master-curve", str(path)]) == 2
-    assert "not a master curve kept by --keep" in capsys.readouterr().err
+    assert "this is not a master curve that --keep has written" in capsys.readouterr().err
 
 
 def table_of_two_groups(path):

@@ -14,7 +14,8 @@ from mdr_dask.models.data_file import DataFile
 
 #: Number of digits to which the values of a range are rounded. Rounding errors are in the last two digits of a double.
 _DIGITS = 14
-#: Values of an axis count as equal if they agree in this number of digits; they may come from different formulas.
+#: Two values of an axis count as equal if they agree in this number of digits, because two formulas for one value may
+#: differ in the last digits.
 SAME_DIGITS = 12
 #: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
 SOME = 64
@@ -30,7 +31,10 @@ class Spread:
     whole: bool
 
     def at(self, shares: Any) -> list[float]:
-        """Return the values at fractions (0 to 1) of the interval, rounded to 14 digits to make powers of ten exact."""
+        """Return the value at each fraction of the interval: 0 gives `low`, 1 gives `high`.
+
+        The values are rounded with `tidy`, so that powers of ten are exact.
+        """
         if self.geometric:
             values = self.low * (self.high / self.low) ** shares
         else:
@@ -39,7 +43,7 @@ class Spread:
         return [tidy(value, self.whole) for value in values]
 
     def shares(self, values: Any) -> FloatArray:
-        """Return the fractions of the interval at which values lie: the inverse of `at`."""
+        """Return the fraction of the interval at which each value lies. This is the inverse of `at`."""
         numbers = np.asarray(values, dtype=np.float64)
         if self.geometric:
             found: FloatArray = np.log(numbers / self.low) / np.log(self.high / self.low)
@@ -49,7 +53,10 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Round a number to a whole number if `whole` is true, otherwise to 14 digits, or not at all if `exact` is true."""
+    """Round a number to a whole number if `whole` is true, otherwise to 14 digits.
+
+    If `exact` is true and `whole` is false, the number is returned unchanged.
+    """
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -88,13 +95,13 @@ class Series:
 
     # Name of the Zarr group; empty in a campaign without series.
     name: str
-    # All parameters. A varied parameter has the first value of its axis.
+    # All parameters of the model. Each varied parameter is set to the first value of its axis.
     parameters: Parameters
     axes: tuple[Axis, ...]
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Length of each dimension, in order."""
+        """Length of each dimension, in the order of the axes."""
         return {axis.dim: len(axis.values) for axis in self.axes}
 
 
@@ -120,9 +127,12 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case. Further rounds follow until every tolerance is met."""
+    """The number of realisations of each case.
 
-    # Realisations of the first round, and of all rounds at most.
+    After a first round of realisations, further rounds follow until every tolerance is met.
+    """
+
+    # Number of realisations in the first round, and largest number in all rounds together.
     at_least: int
     at_most: int
     # Largest accepted standard error of the mean of each output.
@@ -151,11 +161,12 @@ class Campaign:
     accuracy: float | None
     # Path (relative to the working directory) or URL of the store.
     store: str
-    # Lengths of chunks that the file sets, by dimension. All other lengths are chosen automatically.
+    # Length of a chunk along each dimension for which the campaign file sets it. All other lengths are chosen
+    # automatically.
     blocks: Mapping[str, int]
     text: str
     source: str
-    # Questions about numbers without a unit, and columns of a table of cases that are not used.
+    # Questions about numbers without a unit, and notes that name the unused columns of a table of cases.
     remarks: tuple[str, ...] = ()
     # Table of measured values of an output, for the fit ``calibration``.
     measured: DataFile | None = None

@@ -18,17 +18,17 @@ from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
-_DEEPEST = 50  # nesting levels; no campaign has more than ten, and Python can read about 1000
-_LARGEST = 200_000  # values of a file; with YAML aliases, a short text can stand for billions of values
-_LONGEST = 300_000  # characters of a file; reading them takes about a second
+_DEEPEST = 50  # largest number of nesting levels; no campaign has more than ten, and Python can read about 1000
+_LARGEST = 200_000  # largest number of values in a file; with YAML aliases, a short text can stand for billions
+_LONGEST = 300_000  # largest number of characters in a file; reading so many takes about a second
 _TOO_DEEP = "too deeply nested, or an alias that contains itself"
-_MOST_DIGITS = 300  # digits of a number; a double has at most 309 before the point
+_MOST_DIGITS = 300  # largest number of digits of a number; a double has at most 309 before its decimal point
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
 
 @dataclass
 class Document:
-    """The data of a YAML file, and the nodes of the file from which they were read."""
+    """The data of a YAML file, and the YAML nodes from which the data were read."""
 
     # Path of the file, and its text.
     source: str
@@ -47,7 +47,7 @@ class Document:
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
 
     def key_place(self, path: Path) -> Place:
-        """Return the position of the key at a path. An entry of a list has no key; its value is used."""
+        """Return the position of the key at a path. An entry of a list has no key; its own position is returned."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
 
     def report(self, path: Path, what: str, key: bool = False) -> None:
@@ -73,7 +73,7 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Return the document in a YAML 1.2 text. Messages call the text `source`, which may be the name of its file."""
+    """Parse a YAML 1.2 text. Messages call this text `source`, for example the name of its file."""
     document = Document(source, text)
     problems = document.problems
     if len(text) > _LONGEST:
@@ -110,7 +110,7 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
-    """Return a hint that names the likely mistake at a syntax error or in the lines just above."""
+    """Return a hint that names the likely mistake at the position of a syntax error or in the lines just above."""
     if text[index : index + 1] == "\t":
         return " (indent with spaces, not with tabs)"
     end = text.find("\n", index)
@@ -127,7 +127,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last line is indented differently from the line above, unless that line ends with a colon."""
+    """Return whether the last line and the line above differ in indentation although no colon ends the line above."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False

@@ -41,9 +41,10 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 
 
 def draft(name: str, model: Model[Any], file: str) -> str:
-    """Return the text of a campaign that passes every check, unless the model needs a data file.
+    """Return the text of a campaign. The text passes every check if the model needs no data file.
 
-    `name` is the name of the model in a campaign, and `file` the name of the campaign file, for its comments.
+    `name` is the name of the model in a campaign. `file` is the name of the campaign file, which appears in the
+    comments.
     """
     short = name.partition(":")[2].lower() if ":" in name else name
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
@@ -95,7 +96,10 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return example texts of a value: one for each structure that it may have, or a single text."""
+    """Return examples of the value of a field, each as text.
+
+    A nested parameter set gives one example for each set that the field accepts and for each of its alternatives.
+    """
     info = parameters.model_fields[name]
     kinds = list(fields.structures(info))
     if inner:
@@ -107,7 +111,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return examples of a structure, one for each of its alternatives, each on one line."""
+    """Return examples of a parameter set, each on one line: one for each member of its first group of alternatives."""
     group = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]

@@ -33,9 +33,10 @@ def expand(
     directory: str,
     outputs: Sequence[str],
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series of a campaign that have no problems, and questions and remarks for the user.
+    """Return the series that have no problems, and the questions and remarks for the user.
 
-    Names of files are relative to `directory`. `outputs` are the requested outputs. Problems are added to the document.
+    Problems of the other series are added to the document. Names of files are relative to `directory`. `outputs` are
+    the names of the requested outputs.
     """
     found = []
     asked: dict[str, None] = {}
@@ -87,7 +88,10 @@ class _Expansion:
     def _require_places(
         self, base: Parameters, axis: Axis, origin: Origin, model: Model[Any], outputs: Sequence[str]
     ) -> None:
-        """Report a problem if an axis changes the coordinates of an output: all cases share one array."""
+        """Report a problem if an axis changes the coordinates of an output.
+
+        The coordinates must be the same in all cases, because all cases of an output are stored in one array.
+        """
         wanted = [model.output(name) for name in outputs]
         if not any(output.dims for output in wanted):
             return
@@ -149,7 +153,10 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the values of one axis, each checked with the first values of all other axes; None if one is wrong."""
+        """Return the checked values of one axis, or None if one of these values is wrong.
+
+        Each value is checked together with the first values of all other axes.
+        """
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         # the problems of the other axes are reported when their own values are checked
@@ -159,7 +166,7 @@ class _Expansion:
         values: list[Any] = []
         seen, are_valid = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            # if the field is checked by its bounds alone, a value between two valid ends of a range is valid
+            # if the field is checked by its bounds alone, every value between the valid ends of a range is valid
             if item.inner and (not are_valid or independent):
                 values.append(item.value)
                 continue
@@ -180,7 +187,7 @@ class _Expansion:
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
     ) -> list[list[Any] | None]:
-        """Return the checked values of every varied parameter in all cases; only None if a case is wrong."""
+        """Return, for each varied parameter, its checked values in all cases. If a case is wrong, return ``[None]``."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         are_independent = all(fields.is_independent(self.parameters, one.path, self.data) for one in variations)
         cases = list(zip(*(one.items for one in variations), strict=False))
@@ -261,7 +268,7 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return the data with the checked values of the fixed parameters."""
+    """Return the data in which every parameter that is not in `varied` has its checked value from `base`."""
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

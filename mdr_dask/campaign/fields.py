@@ -1,4 +1,4 @@
-"""The keys that a campaign file may have: types, units and nested structures of the fields of parameter sets."""
+"""The fields of parameter sets, which are keys of a campaign file: their types, units and nested parameter sets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from mdr_dask.models.data_file import DataFile
 
 
 def walk(parameters: type[BaseModel], before: str = "") -> Iterator[tuple[str, type[BaseModel], FieldInfo]]:
-    """Yield the dotted name, the parameter set and the field of all keys with more than one possible value."""
+    """Yield the dotted name, the parameter set and the field of every key, including the keys of nested sets.
+
+    Keys with only one possible value, such as ``shape: cone``, are left out.
+    """
     for name, info in parameters.model_fields.items():
         if name not in fixed(parameters):
             yield f"{before}{name}", parameters, info
@@ -46,7 +49,7 @@ def usual(info: FieldInfo) -> tuple[str, ...]:
 
 
 def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
-    """Return the parameter sets that a value of this field may be."""
+    """Return the parameter sets that a field accepts as its value."""
     kinds = [kind for kind in members(info.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)]
     return tuple(kind for kind in kinds if kind is not DataFile)
 
@@ -54,7 +57,8 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, the set with most keys of the mapping is returned, and then the set with most similar keys.
+    If several sets fit, return the set that has most of the keys of the mapping. If several sets have equally
+    many of them, return the set with most keys of a similar name.
     """
     if not isinstance(value, dict):
         return None

@@ -1,4 +1,4 @@
-"""Read a campaign from a dictionary. Its values may be numbers of numpy, quantities of pint and paths."""
+"""Read a campaign from a dictionary, whose values may be numpy numbers, pint quantities and paths."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ from mdr_dask.models.base import Model
 
 
 def of_keys(source: Mapping[str, Any]) -> Campaign:
-    """Read a campaign from the keys of a campaign file. Messages have no line numbers.
+    """Read a campaign from a dictionary with the keys of a campaign file. Messages have no line numbers.
 
-    Values may also be arrays and numbers of numpy, pandas or xarray, ranges of Python, paths, or quantities of pint.
-    Numbers of numpy are rounded to 14 digits, so that ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
+    Values may also be paths, Python ranges, pint quantities, and arrays and numbers of numpy, pandas or xarray.
+    Floating-point numbers of numpy are rounded to 14 digits, so that ``np.linspace(a, b, n)`` equals ``{linear: [a, b,
+    n]}``.
     """
     keys = {str(key): _written(str(key), value) for key, value in source.items()}
     try:

@@ -58,10 +58,11 @@ def read_measured(
     outputs: Mapping[str, str],
     axes: Mapping[str, ArrayLike] | None = None,
 ) -> Measured:
-    """Read a table of measured points. `conditions` and `outputs` are SI units of the columns that it may have.
+    """Read a table of measured points. `conditions` and `outputs` map names of possible columns to their SI units.
 
-    A column may have the last words of a name: ``temperature`` means ``solid_temperature`` if no shorter name has it.
-    An axis without a column is an unknown, so a column that is not used must not look like one of the `axes`.
+    A heading may be the last words of a name: ``temperature`` means ``solid_temperature``, if all other names that end
+    in ``temperature`` have more words. A DataError is raised if the numbers of an unused column lie within the range of
+    an axis that has no column, because this axis would then be taken as an unknown.
     """
     sheet = read_sheet(text, source)
     short = _short_names([*conditions, *outputs])
@@ -98,11 +99,11 @@ def read_measured(
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
-    """Return the headings of columns with errors of the output, their unit, and whether the errors are relative.
+    """Return the headings of the columns with errors of the output, their unit, and whether the errors are relative.
 
-    The output is the last of `columns`. The unit is empty if a heading states it. Errors without a unit have the unit
-    of the output. Errors in percent are relative, unless the values are in percent as well. A heading without a
-    quantity, such as ``std``, belongs to the nearest known column before it.
+    The output is the last of `columns`. The unit is empty if one of the headings states a unit. Otherwise the errors
+    have the unit of the output. Errors in percent are relative, unless the values are in percent as well. A heading
+    without a quantity, such as ``std``, belongs to the nearest known column before it.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):
@@ -125,7 +126,11 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 
 
 def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Return for each name the ends, such as ``temperature`` for ``solid_temperature``, that no shorter name has."""
+    """Return the short forms of each name, such as ``temperature`` for ``solid_temperature``.
+
+    A short form consists of the last words of a name. It belongs to a name if all other names that end in these words
+    are longer.
+    """
     words = [tuple(name.split("_")) for name in names]
     found: dict[str, tuple[str, ...]] = {"_".join(each): () for each in words}
     for end in {each[start:] for each in words for start in range(1, len(each))}:
@@ -136,7 +141,7 @@ def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapping[str, ArrayLike]) -> None:
-    """Raise DataError for a column that is not used although its numbers lie within the range of an unknown axis."""
+    """Raise DataError if the numbers of an unused column lie within the range of an axis that has no column."""
     for axis in [name for name in axes if name not in read]:
         ends = np.asarray(axes[axis], dtype=np.float64)
         low, high = ends.min() - SAME * abs(ends.min()), ends.max() + SAME * abs(ends.max())
@@ -146,7 +151,7 @@ def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapp
             before, factor, zero = factors(unit, units[axis])
             values = before * (numbers[np.isfinite(numbers)] * factor + zero)
             if values.size and low <= values.min() and values.max() <= high:
-                what = f"column {heading!r} is not used, but may be {axis}, which would then be an unknown"
+                what = f"column {heading!r} is not used, but may be {axis}, which is an unknown if it has no column"
                 raise DataError(f"{source}: {what}: name the column {axis}, or delete it")
 
 

@@ -50,7 +50,10 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path in the data to the value with an error: its ``loc`` without the names of types of a union."""
+    """Return the path in the data to the value with an error.
+
+    The ``loc`` of pydantic also contains the name of each possible type of a value; these names are left out.
+    """
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -65,7 +68,10 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error comes from a structure that the user did not mean, judged by the keys of the value."""
+    """Return whether an error comes from a parameter set that the user did not mean.
+
+    The keys of the value show which of the possible parameter sets the user meant.
+    """
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -124,7 +130,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint that a unit may have been forgotten after a number that is out of bounds without the unit."""
+    """Return a hint with the unit that may be missing after a number out of bounds, or an empty text."""
     value, info, unit = value_at(data, path), fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
@@ -136,7 +142,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint how to write a value that is a single word instead of a mapping or a list."""
+    """Return a hint for a word in place of a mapping or a list: how to write this mapping or list."""
     value, info = value_at(data, path), fields.field_at(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -154,7 +160,7 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return the keys in the structures of a field whose values are names of files."""
+    """Return the keys whose values are names of files, in all parameter sets that a field accepts."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [

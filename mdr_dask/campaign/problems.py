@@ -53,7 +53,10 @@ class Problems:
         self._found.setdefault((place, where), Problem(place, where, what))
 
     def raise_if_any(self, questions: Iterable[str] = ()) -> None:
-        """Raise one `CampaignError` with all problems, sorted by file and line, and then the questions."""
+        """Raise one `CampaignError` if there are problems.
+
+        Its messages are the problems, sorted by file and line, followed by the questions.
+        """
         if self._found:
             sources = list(dict.fromkeys(place.source for place, _ in self._found))
             ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))

@@ -76,7 +76,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys, with the default value for each wrong key, and the names of the wrong keys."""
+    """Return the checked keys and the names of the wrong keys. A wrong key gets its default value or a placeholder."""
     wrong: set[str] = set()
 
     def report(path: Path, what: str, key: bool) -> None:
@@ -102,7 +102,10 @@ def _model(document: Document, spec: CampaignSpec) -> Model[Any] | None:
 
 
 def with_hint(error: ModelError, name: str) -> str:
-    """Return the message about a model that cannot be loaded, with the nearest name or the page on own models."""
+    """Return the message about a model that cannot be loaded.
+
+    The message ends with a hint: the known model with the nearest name, or the page of the documentation on own models.
+    """
     is_unknown = str(error).startswith("unknown")
     return f"{error}{did_you_mean(name, models.names()) if is_unknown else ' (see docs/own-model.md)'}"
 

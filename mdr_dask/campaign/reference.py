@@ -91,7 +91,7 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
 
 
 def alternatives_of(model: Model[Any]) -> list[str]:
-    """Return the alternatives of a model, one line for each group: ``length with rms_roughness, or profile``."""
+    """Return one line for each group of alternative parameters: ``length with rms_roughness, or profile``."""
     nested = [(f"{path}.", kind) for path, _, info in fields.walk(model.parameters) for kind in fields.structures(info)]
     return [
         describe(tuple(tuple(f"{before}{name}" for name in member) for member in group))
@@ -101,7 +101,7 @@ def alternatives_of(model: Model[Any]) -> list[str]:
 
 
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
-    """Return name, unit, own dimensions, default, error and meaning of every output of a model."""
+    """Return a row for each output of a model: name, unit, dimensions within a case, default, error and meaning."""
     return [
         {
             "output": output.name,

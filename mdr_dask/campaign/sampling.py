@@ -48,9 +48,10 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the points of the design of Saltelli from pairs of points a and b, shape (points, inputs).
+    """Return the points of the design of Saltelli from pairs of points a in `first` and b in `second`.
 
-    Each pair gives a, b, and one point for every input: a copy of a in which this input has its value from b.
+    Each pair gives a, b, and one point for every input: a copy of a in which this input has its value from b. All
+    arrays have the shape (points, inputs).
     """
     import numpy as np
 
@@ -73,8 +74,9 @@ def tabled(
 ) -> tuple[Variation, ...] | None:
     """Read the varied parameters from a CSV file: each column is a parameter, and each line is a case.
 
-    The file `name` is relative to `directory`; `origin` is the position of this name in the campaign. `data` are the
-    values of the other parameters. If there are `problems`, the result is None. Ignored columns go into `remarks`.
+    The file `name` is relative to `directory`; `origin` is the position of this name in the campaign. `data` contains
+    the parameters that the campaign file itself gives. If the table is wrong, its problems are added to `problems`, and
+    the result is None. The names of ignored columns are added to `remarks`.
     """
     path = Path(directory, name)
     try:
@@ -109,7 +111,7 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is ignored. Numbers below a heading similar to a parameter are not ignored."""
+    """Return whether a column is ignored. A column of numbers is not ignored if its heading resembles a parameter."""
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

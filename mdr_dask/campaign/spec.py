@@ -33,7 +33,7 @@ class ToleranceSpec(Parameters):
 
 
 class AdaptiveSpec(Parameters):
-    """A number of realisations that grows for each case until its standard errors are small enough."""
+    """Each case gets more realisations until its standard errors are small enough."""
 
     at_least: Whole = Field(20, ge=2, description="number of realisations that every case gets")
     at_most: Whole = Field(description="largest number of realisations that a case may get", ge=2)
@@ -176,7 +176,8 @@ class CampaignSpec(Parameters):
         "1", "largest accepted discretisation error of every output, relative to its value", default=None, gt=0, lt=1
     )
     outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
-        None, description="outputs to compute; by default those that the tables of the models below mark"
+        None,
+        description="outputs to compute; without this key, all outputs that the table of the model marks as default",
     )
     errors: bool = Field(
         True,

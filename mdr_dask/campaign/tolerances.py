@@ -26,7 +26,7 @@ def tolerances(
     model: Model[Any],
     outputs: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """Return the tolerances at a path in SI, by output. Unknown names and wrong tolerances are reported."""
+    """Return the tolerance of each output in SI. Unknown names and wrong tolerances below `path` are reported."""
     known = [output.name for output in model.outputs if output.name in outputs]
     found = {}
     for name, written in given.items():
@@ -42,12 +42,18 @@ def tolerances(
 
 
 def is_of_fit(name: str, model: Model[Any]) -> bool:
-    """Return whether a name means a fitted constant, such as ``zone_one.alpha``, and is not a misspelt output."""
+    """Return whether a name means a fitted constant, such as ``zone_one.alpha``.
+
+    A name that resembles an output is taken as a misspelt output.
+    """
     return not similar(name, [output.name for output in model.outputs])
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants, by ``fit.constant``: relative with ``%``, otherwise absolute."""
+    """Return the tolerances of fitted constants, with keys of the form ``fit.constant``.
+
+    A tolerance with ``%`` is relative to the constant; a number without ``%`` is absolute.
+    """
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"

@@ -26,7 +26,10 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The place where a value is written, for messages: key, position in the file, and path (None in a table)."""
+    """The place where a value is written, for messages: its key, its position in the file, and its path.
+
+    The path is None if the value is written in a table.
+    """
 
     name: str
     place: Place
@@ -34,7 +37,10 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written or in SI; `inner` is true between the smallest and the largest."""
+    """One value of a varied parameter, as written in the file or in SI.
+
+    `inner` is true for a value that was computed from a range and is neither the smallest nor the largest.
+    """
 
     value: Any
     origin: Origin
@@ -51,7 +57,7 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    An adaptive axis has both, and `written` is its path in the document.
+    An adaptive axis has both values and an interval, and `written` is its path in the document.
     """
 
     path: tuple[str, ...]
@@ -78,8 +84,9 @@ def find(
 ) -> tuple[Variation, ...]:
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
-    `paths` are the paths of the values `data` in the document. If `drawn` is true, ranges have no number of values. The
-    variation of a parameter with a problem is empty.
+    `paths` contains the path in the document of each parameter in `data`. If `drawn` is true, values are drawn from the
+    ranges, so that a range is written without a number of values. A parameter with a problem is returned without
+    values.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
@@ -228,7 +235,10 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return at most `count` values between the exact ends of an interval. Whole numbers are not repeated."""
+    """Return at most `count` values of an interval, including its exact ends.
+
+    If several values are rounded to the same whole number, this number appears only once.
+    """
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
     ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
     return list(dict.fromkeys([ends[0], *inner, ends[1]]))

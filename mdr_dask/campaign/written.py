@@ -18,9 +18,9 @@ from mdr_dask.units import is_doubtful, likely, unit_behind
 
 @lru_cache(maxsize=16)
 def written_units(text: str) -> dict[str, str]:
-    """Return the unit of every parameter whose values are all written in one unit, by coordinate: ``indenter_radius``.
+    """Return the unit of each parameter for which the campaign uses one unit only. The keys are names of coordinates.
 
-    If the text of the campaign cannot be read, the result is empty.
+    For example, the key of ``indenter.radius`` is ``indenter_radius``. If the text cannot be read, the result is empty.
     """
     whole = parse(text, "").data
     data = whole if isinstance(whole, dict) else {}
@@ -40,9 +40,10 @@ def questions(
     paths: Mapping[str, Path],
     units: Mapping[str, str],
 ) -> Iterator[str]:
-    """Yield a question for each parameter that has a number without a unit, if this number may not be meant in SI.
+    """Yield a question for each parameter with a number that has no unit and is perhaps not meant in SI.
 
-    `paths` are the paths of the values `data` in the document. `units` are units that differ from the declared ones.
+    `paths` contains the path in the document of each parameter in `data`. `units` contains the units that differ from
+    the units declared in the model, by dotted name.
     """
     asked: set[Path] = set()
     for name, given in data.items():
@@ -67,7 +68,10 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """Yield parameter, position and value of every number and text. Lists belong to the varied parameter."""
+    """Yield the parameter, the path and the value of every number and text.
+
+    The entries of a list and the ends of a range have the parameter to which the list or range belongs.
+    """
     if isinstance(value, dict):
         for key, inner in value.items():
             if key in RANGES and isinstance(inner, list):

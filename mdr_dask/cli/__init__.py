@@ -134,10 +134,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace missing standard streams, and print characters that the encoding of a stream lacks as ASCII escapes."""
+    """Replace missing standard streams. Characters that the encoding of a stream lacks become ASCII escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # closed by a service manager, or by `>&-` in a shell
+        if stream is None:  # the stream was closed by a service manager, or by `>&-` in a shell
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

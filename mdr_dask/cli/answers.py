@@ -40,7 +40,7 @@ def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
 
 
 def write_answer(answer: Table, path: Path) -> int:
-    """Write a table to a file in the format of its suffix; return the number of rows."""
+    """Write a table to a file, in the format that the suffix of its name states; return the number of rows."""
     rows = 0
 
     def counted() -> Iterator[pd.DataFrame]:
@@ -60,7 +60,10 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise an error if a table cannot be written to a path: wrong suffix, a study at the path, or no pyarrow."""
+    """Raise an error if a table cannot be written to a path.
+
+    The suffix may be unknown, the path may be the store of a study, or pyarrow may be missing.
+    """
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)
@@ -130,7 +133,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return a text that names the printed errors: once if they agree for all outputs, else for each output."""
+    """Return a text that names the printed errors: once if it is true for all outputs, otherwise for each output."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""

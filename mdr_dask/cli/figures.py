@@ -27,7 +27,7 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures and writes its command line into their tables."""
+    """A command that draws figures. Its command line is written into the tables of the figures."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Keep the command line as it was typed, then parse it."""
@@ -227,7 +227,10 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store by their names in legends, which name the store if there are several stores."""
+    """Return the groups of a store by their names in legends.
+
+    If several stores are drawn, each name begins with the name of the store.
+    """
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -241,7 +244,7 @@ def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, x
 
 
 def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:
-    """Draw a single figure and its table to files, and print notes that the picture does not show."""
+    """Draw a single figure, write it and its table to files, and print notes that the picture does not show."""
     from mdr_dask.plots import page
 
     with page.drawing_for(page.requested(**look)):
@@ -271,7 +274,7 @@ def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:
-    """Return the path of each figure: any path for a single figure, a folder for several figures."""
+    """Return the path of each figure. A single figure may have any path; several figures are written to a folder."""
     folder = output or Path("figures")
     if alone and folder.suffix and not folder.is_dir():
         require_suffix(folder, FIGURES)

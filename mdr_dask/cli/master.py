@@ -77,12 +77,13 @@ def master_curve(
     part: str,
     form: str | None,
 ) -> None:
-    """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
+    """Shift the curves of a store or a table into one master curve; print the factors, their errors and fitted laws.
 
     SOURCE is a store, a table, or a result that --keep has written. A table is a CSV file with a row of names and, if
-    wanted, a row of units; - means standard input. For a result of --keep, only the reference can be changed. If the
-    curves differ in both velocity and temperature, there is a shift factor for every velocity and one for every
-    temperature. The storage and loss modulus of a test are shifted together, unless --of names only one of them.
+    wanted, a row of units; - means standard input. If SOURCE is a result that --keep has written, only the reference
+    can be changed. If the curves differ in both velocity and temperature, there is a shift factor for every velocity
+    and one for every temperature. The storage and loss modulus of a test are shifted together, unless --of names only
+    one of them.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
@@ -98,7 +99,7 @@ def master_curve(
         curve = superpose(_open(source, series, selections), over, ordinates or None, by, vertical, reference)
     elif vertical or over or ordinates or by or selections or series:
         raise click.UsageError(
-            f"{source} is a result of --keep, for which only --reference can be changed: give the original table"
+            f"{source} was written by --keep: only --reference can be changed (for more, give the original table)"
         )
     else:
         curve = kept if reference is None else rereferenced(kept, reference)
@@ -171,12 +172,12 @@ def _kept(source: str) -> xr.Dataset | None:
     except (ValueError, KeyError, TypeError):
         curve = xr.Dataset()
     if "shift_factor" not in curve or "group" not in curve.attrs:
-        raise DataError(f"{path}: not a master curve kept by --keep")
+        raise DataError(f"{path}: this is not a master curve that --keep has written")
     return curve
 
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
-    """Print a part of the result. If curves differ in two quantities, there is a table of factors for each quantity."""
+    """Print one part of the result. If the curves differ in two quantities, print a table of factors for each."""
     shown = []
     if part != "factors":
         dims = (part.removesuffix("s"),)
@@ -202,7 +203,8 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     _print_table(curve, part, form or "table")
     if "second" in curve.attrs:
         click.echo(
-            f"shift = {by} part + {curve.attrs['second']} part, zero at {curve.attrs['second_reference']:.6g}; "
+            f"shift = {by} part + {curve.attrs['second']} part, which is zero at "
+            f"{curve.attrs['second']} = {curve.attrs['second_reference']:.6g}; "
             f"chi-squared of the sum {curve.attrs['chi_squared']:.3g} per degree of freedom, "
             f"probability {curve.attrs['probability']:.2g}",
             err=True,
@@ -212,8 +214,8 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     low, high = (float(curve["curve_abscissa"].attrs[f"measured_{end}"]) for end in ("low", "high"))
     ends = curve["curve_abscissa"].to_numpy()
     click.echo(
-        f"merged over {curve.attrs['abscissa']} {ends.min():.4g} .. {ends.max():.4g}, "
-        f"measured at {by} = {curve.attrs['reference']:.6g}: {low:.4g} .. {high:.4g}",
+        f"{curve.attrs['abscissa']} of the merged curve: {ends.min():.4g} .. {ends.max():.4g}, "
+        f"of which {low:.4g} .. {high:.4g} was measured at {by} = {curve.attrs['reference']:.6g}",
         err=True,
     )
     constants = {str(n): float(v) for n, v in curve.data_vars.items() if v.ndim == 0 and f"{n}_low" in curve}

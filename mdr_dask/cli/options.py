@@ -83,7 +83,10 @@ def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def figure_options(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add an option, spelt `names`, for the file of a figure as the argument `figure`, and options for its `look`."""
+    """Add an option for the file of a figure, and the options for the look of the figure.
+
+    `names` are the spellings of the first option. The command gets the arguments `figure` and `look`.
+    """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: If the error of a mean is below this fraction of the mean, it counts as a rounding error.
+#: The error of a mean counts as a rounding error if it is below this fraction of the mean.
 ROUNDING = 1e-13
 #: `GAP`: number of spaces between two columns of a table. `NARROWEST`: tables are formatted for at least this width, in
 #: characters, even if the terminal is narrower.
@@ -55,7 +55,10 @@ def _filled(line: str) -> str:
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
-    """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units."""
+    """Print rows as an aligned ``table``, as ``csv``, or as one ``json`` document with units.
+
+    All rows have the same keys.
+    """
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
         return
@@ -153,7 +156,7 @@ def _is_text(column: Sequence[str]) -> bool:
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts. If the line is too long, its other lines begin below the first character of the second text."""
+    """Join two texts. If they need several lines, the second text is wrapped below its first character."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -206,7 +209,7 @@ def print_json(document: Any) -> None:
 
 
 def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
-    """Return one row for each point of the dimensions of a Dataset, and the units of the columns."""
+    """Return the rows of a Dataset, one for each combination of its coordinates, and the units of the columns."""
     data = dataset.drop_vars([name for name, coord in dataset.coords.items() if coord.ndim == 0])
     dims = [str(dim) for dim in data.sizes]
     names = [*dims, *(str(name) for name in data.variables if name not in dims)]

@@ -112,7 +112,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return a text that names the counted results, or an empty text if all results of the study are counted."""
+    """Return the name of the counted results, such as ``first round``, or an empty text if all results are counted."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)
@@ -174,9 +174,12 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
 
 def _print_failed(url: str, progress: Progress) -> None:
     if progress.kept_failed:
-        click.echo(f"{progress.kept_failed} of them failed before: --retry-failed computes them again", err=True)
+        click.echo(
+            f"results that failed in an earlier run: {progress.kept_failed} (--retry-failed computes them again)",
+            err=True,
+        )
     if progress.failed or progress.kept_failed:
-        click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+        click.echo(f"list of failed results with reasons: mdr-dask status {url} --failures", err=True)
 
 
 def _shared(progress: Progress) -> str:

@@ -70,7 +70,9 @@ def sensitivity(
 def _sentences(attributes: dict[str, object]) -> list[str]:
     sentences = []
     if attributes["left_out"]:
-        sentences.append(f"{attributes['left_out']} of {attributes['cases']} cases without a value are left out")
+        sentences.append(
+            f"{attributes['left_out']} of {attributes['cases']} cases are left out, because they have no value"
+        )
     if attributes["realisations"] == 1:
         sentences.append("with one realisation, scatter between realisations counts as an interaction")
     return [*sentences, str(attributes["advice"])]

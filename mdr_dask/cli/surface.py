@@ -125,7 +125,10 @@ def _option(name: str) -> str:
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return the kind of a file: a spectrum by the names of its columns, a map with two dimensions, or else a scan."""
+    """Return the kind of a file: a spectrum, a map or a scan.
+
+    The names of the columns show whether it is a spectrum. A map has two dimensions, or an option that only maps have.
+    """
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
     from mdr_dask.models.parts.surface_files import is_spectrum

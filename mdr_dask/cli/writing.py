@@ -29,7 +29,7 @@ def writing(path: Path) -> Iterator[None]:
     except BaseException as error:
         if not there and path.exists():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        with suppress(OSError):  # rmdir fails if a folder was not made or is not empty
+        with suppress(OSError):  # rmdir fails if the folder does not exist or is not empty
             for folder in missing:
                 folder.rmdir()
         if isinstance(error, OSError) and error.filename is None:

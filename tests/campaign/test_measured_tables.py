@@ -62,7 +62,9 @@ def test_columns_that_may_be_an_axis_are_not_left_out(heading):
     """An axis without a column would be an unknown of the calibration."""
     text = f"velocity [m/s];mu;{heading};F_t [N];room [degC];n\n1;0,3;2;700;20;30\n2;0,4;5;800;21;30\n"
     axes = {"velocity": (1, 2), "normal_force": (1e-3, 6)}
-    with pytest.raises(DataError, match="is not used, but may be normal_force, which would then be an unknown: name"):
+    with pytest.raises(
+        DataError, match="is not used, but may be normal_force, which is an unknown if it has no column: name"
+    ):
         read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, axes)
     assert read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2)}).remark.startswith("not used")
 
