@@ -108,7 +108,7 @@ def test_an_anisotropic_map_needs_a_direction(tmp_path):
         ("map.npy", HEIGHT[:8], "expected a map of 16 x 16 points or more"),
         ("map.npy", 0 * HEIGHT, "expected a rough map, got a flat one"),
         ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), "expected at most 5 % of missing points"),
-        ("map.npy", b"nothing", "expected an array of numpy"),
+        ("map.npy", b"nothing", "expected a numpy array"),
         ("map.opd", b"nothing", "SurfaceTopography cannot read it"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Find the results that miss the accuracy of a campaign, for all models."""
+"""Find the cases of any model whose estimated errors exceed the accuracy that the campaign requires."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return a message for every case with outputs that miss the accuracy, by the index of the case.
+    """Return a dict from the index of a case to a message, for all cases in which an output misses the accuracy.
 
-    The accuracy limits the relative error of each output: its largest error divided by the larger of its largest value
-    and its floor. `values` and `errors` have the shape (cases, ...); elements with NaN are ignored. A floor has the
-    unit of its output. `where` is added to the messages, such as ``" on the finest grid"``.
+    An output misses the accuracy if its relative error exceeds `accuracy`. The relative error is the largest absolute
+    error of the output, divided by its largest absolute value or by its floor, whichever is larger. `values` and
+    `errors` have the shape (cases, ...); elements with NaN are ignored. A floor has the unit of its output. `where` is
+    added to the messages, such as ``" on the finest grid"``.
     """
     shares = {
         name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()
@@ -43,7 +44,7 @@ def missed_accuracy(
 def _relative_errors(values: ArrayLike, errors: ArrayLike, floor: ArrayLike) -> FloatArray:
     """Return the relative error of one output for every case, shape (cases,).
 
-    The relative error is infinite if the value and the floor are 0 and the error is not.
+    The relative error is 0 if all errors are 0, and infinite if all values and the floor are 0 but some error is not.
     """
     size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (values, errors))
     known = ~(np.isnan(size) | np.isnan(error))

@@ -1,4 +1,4 @@
-"""Heights of maps and line scans from files: text, numpy arrays, or the formats of instruments."""
+"""Read maps and line scans of heights from text files, from numpy files, and from files of instruments."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ MOST_COLUMNS = 6
 
 
 class Units(NamedTuple):
-    """Units of heights and of positions, and the distances between points along x and y in m.
+    """Unit of the heights, unit of the positions, and the spacings of the points along x and along y.
 
-    A unit that is not stated is empty, and a distance that is not stated is None.
+    The spacings are in m. A unit that is not given is an empty string, and a spacing that is not given is None.
     """
 
     height: str = ""
@@ -51,7 +51,7 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of the file, in rows along x, and the steps along x and y in the unit of the positions."""
+    """Heights as they are in a file. The rows run along x. The steps along x and y are in the unit of the positions."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -60,10 +60,11 @@ class _Grid(NamedTuple):
 
 
 def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]:
-    """Return a map from a text, an array of numpy, or a format of SurfaceTopography, and remarks on how it was read.
+    """Return the map in a file, and remarks on how it was read.
 
-    Missing points are NaN. `units` are those that the user states. Rows of text and npy files run along x and are
-    stacked along y. Raise DataError if a unit or spacing is missing, or if the file and the user state different ones.
+    The file is a text, an npy file, or a file that SurfaceTopography can read. Rows of text and npy files run along x
+    and are stacked along y. In the map, missing points are NaN. `units` are the units and spacings that the user
+    states. Raise DataError if a unit or spacing is missing, or if the file and the user state different ones.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -80,10 +81,10 @@ def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]
 
 
 def read_scan(file: DataFile, units: Units) -> Scan:
-    """Return a line scan, with missing heights interpolated, from a table or a format of SurfaceTopography.
+    """Return the line scan in a file. Missing heights are interpolated.
 
-    `units` are those that the user states. Raise DataError if a unit is missing, or if the file and the user state
-    different ones.
+    The file is a table, or a file that SurfaceTopography can read. `units` are the units and the spacing that the user
+    states. Raise DataError if a unit is missing, or if the file and the user state different ones.
     """
     from mdr_dask.physics.surfaces.maps import require_few_missing
 
@@ -134,8 +135,9 @@ def dimensions(file: DataFile) -> int:
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
     """Return the length, in m, of the unit of the heights, and the spacings along x and y in m.
 
-    The file or the user states them. If only the unit of positions is missing, it is found from the spacing that the
-    user states: this spacing must be the step of the positions times a power of ten.
+    The file or the user states the unit and the spacings. If only the unit of the positions is missing, it is found
+    from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. The
+    unit is always a power of ten of a metre.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -180,7 +182,7 @@ def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
 
 
 def _metre(file: DataFile, unit: str, option: str) -> float:
-    """Return how many metres a unit of length has."""
+    """Return the length of a unit in metres."""
     try:
         return to_si(f"1 {unit}", "m")
     except ValueError as error:
@@ -188,15 +190,15 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file that SurfaceTopography can read; None for a text, which this module reads."""
-    file.read_bytes()  # to raise an error if the file has changed
+    """Return the main channel of a file, read by SurfaceTopography; return None for a text."""
+    file.read_bytes()  # raises an error if the file has changed
     import warnings
 
     not_text = ""
     if file.name.lower().endswith(TEXT):
         try:
             file.read_text()
-        except DataError as problem:  # such as a binary file of Zygo, which also ends in .dat
+        except DataError as problem:  # a binary file with an ending of text files, such as the .dat of Zygo
             not_text = f" ({problem})"
         else:
             return None
@@ -206,14 +208,14 @@ def _channel(file: DataFile) -> Any:
         raise DataError(f"{file.name}: this format needs SurfaceTopography: pip install 'mdr_dask[formats]'") from None
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # warnings of readers that only test whether they can read the file
+            warnings.simplefilter("ignore")  # each reader tests whether it can read the file, and may warn
             return SurfaceTopography.open_topography(file.path).default_channel
     except Exception as problem:  # the readers raise errors of many types
         raise DataError(f"{file.name}: SurfaceTopography cannot read it: {type(problem).__name__}{not_text}") from None
 
 
 def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
-    """Return the map or line of a channel, and the common unit of its heights and positions."""
+    """Return the map or line scan of a channel, and the unit that its heights and its positions have in common."""
     stated = channel.unit or ""
     unit = _one_unit(file, "unit", stated, units.height)
     if not unit:
@@ -239,11 +241,11 @@ def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
 
 
 def _array(file: DataFile) -> FloatArray:
-    """Return the rows of a numpy array file."""
+    """Return the two-dimensional array in an npy file."""
     try:
         array: Any = np.load(io.BytesIO(file.read_bytes()), allow_pickle=False)
     except (ValueError, EOFError, OSError) as problem:
-        raise DataError(f"{file.name}: expected an array of numpy: {problem}") from None
+        raise DataError(f"{file.name}: expected a numpy array: {problem}") from None
     if array.dtype.kind not in "iuf":
         raise DataError(f"{file.name}: expected heights, got numbers of the type {array.dtype}")
     if array.ndim != 2:
@@ -255,7 +257,7 @@ def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
     """Return the heights of a grid file of Surfer or ESRI; return None for any other text.
 
     A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z; its rows have ascending y. An
-    ESRI text begins with names and numbers; its rows have descending y.
+    ESRI text begins with lines of a name and a number, such as ``ncols 512``; its rows have descending y.
     """
     kind = {"dsaa": "Surfer", "ncols": "ESRI"}.get("".join(lines[:1]).casefold().partition(" ")[0].strip())
     if kind is None:
@@ -273,12 +275,12 @@ def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
         return _Grid(rows.reshape(int(head["nrows"]), int(head["ncols"]))[::-1], steps)
     except (KeyError, ValueError, ZeroDivisionError):
         raise DataError(
-            f"{file.name}: expected a grid of {kind} with a complete heading, and as many heights as stated in it"
+            f"{file.name}: expected a grid of {kind} with a complete heading, and as many heights as the heading states"
         ) from None
 
 
 def _grid_of_text(file: DataFile) -> _Grid:
-    """Return the heights of a text file, with the units and spacings stated in it."""
+    """Return the heights of a text file, and the units and spacings that the file states."""
     lines = file.read_text().replace('"', "").splitlines()
     if (grid := _grid_file(file, lines)) is not None:
         return grid
@@ -305,9 +307,9 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units) -> _Grid
 def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int]) -> Units:
     """Return the units and spacings that a file states before its heights.
 
-    They are in lines of their own or in a corner cell such as ``y [um]``. A line that names heights or positions and
-    ends in a unit of length states the unit of this quantity. A line that names a spacing states the value of the
-    spacing. Gwyddion states the lengths of both sides of the map: ``Width: 10 um`` and ``Height: 10 um``.
+    Such a line names a quantity and ends in a unit of length. ``Height [um]`` states the unit of the heights, and
+    ``Position [mm]`` that of the positions; the first cell of a table, such as ``y [um]``, can do the same. ``Spacing:
+    2 um`` states a spacing. Gwyddion states the sides of the map instead: ``Width: 10 um`` and ``Height: 10 um``.
     """
     sides = {"width": ("spacing", shape[1]), "height": ("spacing_y", shape[0])}
     corner = re.split(r"[\t;,]", first)[0]
@@ -326,7 +328,7 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
         elif number and len(words) == 3 and words[0].casefold() in sides:
             key, points = sides[words[0].casefold()]
             found.setdefault(key, {})[f"{float(words[1]) / points} {words[2]}"] = line
-        elif not number and bool(along) != bool(upwards):  # a line with names of both kinds names the columns
+        elif not number and bool(along) != bool(upwards):  # a line that names both contains names of columns
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line
@@ -340,7 +342,7 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, with NaN for words, and the index of the first numeric line."""
+    """Return the numeric rows of a text as a table, and the index of the first of these lines. Words become NaN."""
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -362,11 +364,12 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
         rows = [line.rstrip(" ").removesuffix(separator) for line in rows]
     width = [len(line.split(separator)) for line in rows]
     common = max(set(width), key=width.count, default=0)
-    start = next((k for k, count in enumerate(width) if count == common), 0)  # skip numbers in the preamble
+    # lines of numbers above the table, which have another number of columns, are skipped
+    start = next((k for k, count in enumerate(width) if count == common), 0)
     odd = next((k for k in range(start, len(width)) if width[k] != common), None)
     first = lines.index(kept[numeric[0] + start]) if kept else 0
     text = "\n".join((separator or " ").join(line.split(separator)) for line in rows[start:odd])
-    text = text.replace(decimal, ".")  # pandas leaves decimal commas in a column that also contains words
+    text = text.replace(decimal, ".")  # pandas converts no decimal commas in a column that also contains words
     try:
         table = pd.read_csv(
             io.StringIO(text),
@@ -383,7 +386,7 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     return table.apply(pd.to_numeric, errors="coerce"), first
 
 
-#: Columns of a table that holds the points of a map.
+#: Columns of a table in which each row is one point of a map.
 COORDINATES = (
     Column("x", "m"),
     Column("y", "m", ("Y",)),
@@ -392,9 +395,9 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return index and unit of the columns x, y and z of a table; empty if one of them is missing.
+    """Return an index and a unit for each of the columns x, y and z; return no columns if one of the three is missing.
 
-    If the table has no names, x, y and z are the three columns that do not hold row numbers.
+    If the columns have no names, x, y and z are the three columns that do not hold row numbers.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)
@@ -414,7 +417,7 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFra
 
 
 def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame, stated: Units) -> _Grid:
-    """Return the grid of a table of x, y and z in any order; grid points without a row are missing points."""
+    """Return the heights of a table with rows x, y, z in any order. A grid point without a row is a missing point."""
     columns = _coordinates(file, lines, first, cells)
     if not columns:
         raise DataError(
@@ -434,10 +437,10 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 
 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
-    """Return positions and heights of a table in m.
+    """Return the positions and the heights of a line scan, both in m, from a table.
 
-    If the table has no names, the positions are the column that only rises or only falls. A table of heights alone
-    needs a spacing.
+    If the columns have no names, the positions are the column whose numbers only rise or only fall. If the table
+    contains heights alone, the user must give the spacing.
     """
     text = file.read_text()
     sheet = read_sheet(text, file.name)

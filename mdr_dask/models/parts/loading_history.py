@@ -113,8 +113,8 @@ Protocol = Annotated[Jump | Steps | Ramp | Oscillation | TableFile, Field(discri
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
-    `velocity` and `force` are those of the sliding body, and `change` is the relative change of the velocity at a jump.
-    The last piece has no end. Raise DataError if a table contradicts the state before t = 0.
+    `velocity` and `force` are the parameters of the sliding body, and `change` is the relative change of the velocity
+    at a jump. The last piece ends at t = infinity. Raise DataError if a table contradicts the state before t = 0.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 
@@ -139,8 +139,8 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
         rows = _table_rows(protocol.file, force)
         if len(rows) > 1 and rows[1][0] == 0 and not np.allclose(rows[0][1:], before, rtol=1e-9, atol=0):
             raise DataError(
-                f"{protocol.file.name}: expected the velocity and force before t = 0, {before[0]:g} m/s and "
-                f"{before[1]:g} N, in the first of two rows at t = 0, got {rows[0][1]:g} m/s and {rows[0][2]:g} N; "
+                f"{protocol.file.name}: the first of two rows at t = 0 states the velocity and the force before t = 0: "
+                f"expected {before[0]:g} m/s and {before[1]:g} N, got {rows[0][1]:g} m/s and {rows[0][2]:g} N; "
                 "correct that row, or velocity, normal_force and start of the campaign"
             )
     found = [Piece(a[0], b[0], (a[1], b[1]), (a[2], b[2])) for a, b in pairwise(rows) if b[0] > a[0]]

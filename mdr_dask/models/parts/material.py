@@ -117,12 +117,12 @@ class Material(Parameters):
             raise ValueError(f"expected one of {', '.join(LAWS)}, got {' and '.join(laws)}")
         superposing = self.dma_table is not None and self.dma_table.table_temperature is None
         if (self.temperature is not None and not laws) or (self.temperature is None and laws and not superposing):
-            raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}, got only one of the two")
+            raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}: give both or neither")
         check_in_campaign(info, lambda: solid_of(self))
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on the error of a fitted Prony series, and on unusual temperatures and moduli."""
+        """Return notes on the error of a fitted Prony series, a temperature outside a table, and doubtful moduli."""
         return (*fit_notes(self), *_table_notes(self))
 
 
@@ -144,7 +144,7 @@ def solid_of(material: Material) -> LinearSolid:
 def _shift(material: Material) -> float | None:
     """Return the relaxation times at the material's temperature, divided by the relaxation times of the data.
 
-    Return None if no law of the temperature dependence is given.
+    Return None if no law or no temperature is given.
     """
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
@@ -154,7 +154,10 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return b_T at the material's temperature, by which the moduli of a table are divided; 1 for other materials."""
+    """Return b_T at the material's temperature; 1 if the moduli do not come from a table.
+
+    The moduli of a table are divided by b_T.
+    """
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
         return 1.0
@@ -179,7 +182,7 @@ def _solid(material: Material) -> LinearSolid:
 
 
 def _fit_of(material: Material) -> SeriesFit | None:
-    """Return the Prony series fitted to a power law or a table; None for other materials."""
+    """Return the Prony series fitted to a power law or a table; return None for other materials."""
     if material.power_law is not None:
         return _power_law_fit(material.power_law)
     return None if material.dma_table is None else _table_fit(material.dma_table, material.law)
@@ -208,7 +211,10 @@ def fit_error(material: Material | None) -> float:
 
 
 def frequencies(material: Material) -> tuple[float, float] | None:
-    """Return the range of angular frequencies, in rad/s, of a power law or a table at the material's temperature."""
+    """Return the lowest and highest angular frequency, in rad/s, of the data of a power law or a table.
+
+    Both are shifted to the material's temperature. Return None for other materials.
+    """
     fit = _fit_of(material)
     if fit is None:
         return None
@@ -234,21 +240,22 @@ def fit_notes(material: Material) -> tuple[str, ...]:
 
 
 def _table_notes(material: Material) -> tuple[str, ...]:
-    """Return notes on a table of moduli: how moduli scale with temperature, and unusual temperatures and moduli."""
+    """Return notes on a table of moduli: the use of b_T, a temperature outside the table, and doubtful moduli."""
     table, temperature = material.dma_table, material.temperature
     if table is None:
         return ()
     curve, notes = one_curve(table, material.law), []
     if temperature is not None and curve.temperature is not None and table.vertical != "none":
         notes.append(
-            f"at other temperatures than {shown(curve.temperature, 'K')}, moduli are divided by "
+            f"at temperatures other than {shown(curve.temperature, 'K')}, moduli are divided by "
             "b_T = rho0 T0 / (rho T) (`vertical: none` turns this off)"
         )
     low, high = curve.measured or (0.0, np.inf)
     if temperature is not None and not low - SAME_TEMPERATURE <= temperature <= high + SAME_TEMPERATURE:
         ends = shown(low, "K") if high - low < SAME_TEMPERATURE else f"{shown(low, 'K')} to {shown(high, 'K')}"
         notes.append(
-            f"measured at {ends}; {shown(temperature, 'K')} lies outside, and is reached by shift factors only"
+            f"measured at {ends}; outside this range, at {shown(temperature, 'K')}, "
+            "moduli are extrapolated by shift factors"
         )
     least, most = float(curve.storage.min()), float(curve.storage.max())
     if most < SOFTEST or least > STIFFEST:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class ProfileFile(NamedByFile):
-    """A measured height profile. The user gives the name of a file, or a name and options."""
+    """A measured height profile. The user writes the name of a file alone, or `file: name` and options."""
 
     file: NamedFile = Field(
         description="file with two columns x, z; SurfaceTopography reads other formats if it is installed"
@@ -52,7 +52,7 @@ class ProfileFile(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on points, length, rms height and rms slope of the line, and remarks about the file."""
+        """Return notes on points, length, rms height and rms slope of the line, and on how the file was read."""
         from mdr_dask.physics.surfaces.waves import waves_of
 
         line = line_of(self)
@@ -72,7 +72,7 @@ def _scan(profile: ProfileFile) -> Scan:
 
 @lru_cache(maxsize=16)
 def line_of(profile: ProfileFile) -> MeasuredLine:
-    """Return one period of the measured line; raise DataError if the file does not contain a line."""
+    """Return the measured line, which is repeated periodically; raise DataError if the file contains no line."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
     scan = _scan(profile)

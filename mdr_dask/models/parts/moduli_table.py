@@ -1,4 +1,4 @@
-"""Parameters of a table from a dynamic mechanical analysis, and the curve of moduli that follows from the table."""
+"""Parameters of a table from a dynamic mechanical analysis, and the computation of one curve of moduli from it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mdr_dask.units import shown
 #: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
-SAME_TEMPERATURE = 1.0  # temperatures that differ by at most this many K count as equal
+SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this count as equal
 #: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
 APART = 0.02
 
@@ -72,7 +72,7 @@ class ModulusTable(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on unused columns, and a note if the table does not say whether its moduli are shear moduli."""
+        """Return notes on unused columns, and a note if the table does not say that its moduli are shear moduli."""
         table = _table(self)
         heading = table.headings["storage modulus"]
         notes = [table.remark] if table.remark else []
@@ -86,8 +86,9 @@ class ModulusTable(NamedByFile):
 class Moduli:
     """One curve of moduli: angular frequency in rad/s, storage and loss modulus in Pa.
 
-    `temperature` is the temperature of the curve, `measured` the lowest and highest temperature of the table, all in K;
-    None if the table has no temperatures. `superposed` describes how curves of several temperatures were superposed.
+    `temperature` is the temperature of the curve in K, and `measured` are the lowest and the highest temperature of the
+    table in K. Both are None if neither the table nor the user states a temperature. `superposed` describes how the
+    curves of several temperatures were superposed.
     """
 
     omega: FloatArray
@@ -102,8 +103,8 @@ class Moduli:
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the shear moduli of a table at one temperature.
 
-    The curves of several temperatures are superposed, unless the user chooses one temperature. Raise DataError if this
-    is impossible.
+    The curves of several temperatures are superposed, unless the user chooses one temperature. Raise DataError if the
+    curves cannot be superposed.
     """
     found = _as_measured(chosen, law)
     divisor = 1.0 if chosen.poisson_ratio is None else 2 * (1 + chosen.poisson_ratio)
@@ -169,7 +170,7 @@ def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: fl
 
 
 def _vertical(chosen: ModulusTable) -> str:
-    """Return a text on the vertical factors."""
+    """Return a text that says whether moduli are multiplied by b_T, and with which thermal expansion."""
     from mdr_dask.physics.superposition.master_curve import EXPANSION
 
     if chosen.vertical == "none":
@@ -179,7 +180,7 @@ def _vertical(chosen: ModulusTable) -> str:
 
 @lru_cache(maxsize=16)
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
-    """Return log10 of the horizontal and the vertical shift factor of every temperature, and a text about them."""
+    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text for the user."""
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     omega, storage, loss, temperature = _measured(chosen)
@@ -208,7 +209,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between the shift factors found from the curves and those of a law."""
+    """Return a text with the largest difference between the shift factors found from the curves and those of `law`."""
     if law is None:
         return ""
     try:
@@ -240,7 +241,7 @@ def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) 
 
 
 def _table(chosen: ModulusTable) -> Read:
-    """Return the columns of the file; storage and loss modulus may be computed from complex modulus and phase angle."""
+    """Return the columns of the file. If it has complex moduli or tan delta, storage and loss modulus are computed."""
     name, content = chosen.file.name, chosen.file.read_text()
 
     def modulus(kind: str, *other_names: str) -> Column:
@@ -281,9 +282,10 @@ def _table(chosen: ModulusTable) -> Read:
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI units.
+    """Return angular frequency, storage modulus, loss modulus and temperature of each row, in SI units.
 
-    Raise DataError for moduli in tension without a Poisson ratio, and for shear moduli with a Poisson ratio.
+    The temperature is None if the file has no such column. Raise DataError for moduli in tension without a Poisson
+    ratio, and for shear moduli with a Poisson ratio.
     """
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = (table[column] for column in ("frequency", "storage modulus", "loss modulus"))
@@ -300,6 +302,6 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
     if tension and not is_shear and chosen.poisson_ratio is None:
         raise DataError(
             f"{name}: column {tension[0]!r} is a modulus in tension: give poisson_ratio (0.5 for rubber), or name the "
-            "columns G' and G'' if they are moduli of shear"
+            "columns G' and G'' if they are shear moduli"
         )
     return omega, storage, loss, temperature

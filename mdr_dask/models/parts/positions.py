@@ -15,13 +15,14 @@ BREAK = 3.0
 """A row or column holds positions if it differs from its neighbours by more than this times the largest difference
 between rows or columns of heights (see `_leading`)."""
 FAR_ALONE = 10.0
-"""A number that occurs once is not a height if its distance from all other heights exceeds this times their range."""
+"""A number that occurs once is not a height if its distance from all other heights exceeds this many times the range of
+those other heights."""
 FEW_LEVELS = 10
 """Heights with at most this many different values belong to a designed surface, such as a grating."""
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
-    """Return, for each line, whether its numbers only rise or only fall, as positions and row numbers do."""
+    """Return, for each row of a table, whether its numbers only rise or only fall, as positions and row numbers do."""
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
     one_way = np.all((steps >= 0) | ~known, axis=1) | np.all((steps <= 0) | ~known, axis=1)
@@ -29,10 +30,11 @@ def rising(lines: FloatArray) -> NDArray[np.bool_]:
 
 
 def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None, float | None], tuple[str, ...]]:
-    """Remove the outermost rows and columns that hold positions or row numbers, which the returned remarks name.
+    """Remove positions and row numbers from the outermost rows and columns of a table of heights.
 
-    Also return the steps of the positions along x and y, None if unknown. Raise DataError if positions are not
-    equidistant, or if several lines of positions have different steps.
+    Return the heights, the steps of the positions along x and y, and remarks that name the removed rows and columns. A
+    step is None if the table has no positions along this axis. Raise DataError if positions are not equidistant, or if
+    two rows (or two columns) of positions have different steps.
     """
     if min(rows.shape) < 4 * OUTER:
         return rows, (None, None), ()
@@ -49,10 +51,10 @@ def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None,
 
 
 def _leading(lines: FloatArray) -> int:
-    """Return the number of lines at the beginning that hold positions or row numbers.
+    """Return how many of the first rows of a table hold positions or row numbers.
 
-    Heights on a tilted surface may only rise, as positions do. But positions differ much more from the adjacent line
-    than two lines of heights differ from each other.
+    On a tilted surface the heights of a row may also only rise or only fall. Such a row counts as positions only if it
+    differs much more from the adjacent rows than rows of heights differ from each other.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -65,36 +67,40 @@ def _leading(lines: FloatArray) -> int:
 
 
 def is_numbered(line: FloatArray) -> bool:
-    """Return whether a line holds the numbers of its points: integers that increase by one from point to point."""
+    """Return whether the numbers of a row or column are consecutive integers, such as 1, 2, 3, 4."""
     return bool(np.all(np.diff(line) == 1) and np.all(line == np.rint(line)))
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the common step of all lines of positions; raise DataError if their steps differ.
+    """Return the step of the positions in all given rows (or columns); raise DataError if two of their steps differ.
 
-    Return None if every line holds the numbers of its points.
+    Rows of consecutive integers are row numbers and have no step. Return None if there are no other rows.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
-        raise DataError(f"more than one {name} of positions, with steps of {apart}: delete all but one")
+        raise DataError(
+            f"more than one {name} of positions, and their steps differ ({apart}): delete all but one {name}"
+        )
     return steps[0] if steps else None
 
 
 def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """Return the index of each position on a regular grid, counted from 0, and the step of the grid.
 
-    Grid points may be missing. Raise DataError if a position is half a step or more off the grid.
+    There may be grid points without a position. Raise DataError if a position is half a step or more off the grid.
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
-    # a gap between points on different grid lines is one to about 3 steps; smaller gaps are deviations from the grid
+    # Positions on one grid line differ by small deviations, and adjacent grid lines by 1 to about 3 steps. A gap counts
+    # as a deviation if it is at most a quarter of the largest gap.
     lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):
         raise DataError("expected positions on a regular grid")
     apart = np.diff(middles)
-    place = np.append(0.0, np.cumsum(np.rint(apart / np.median(apart))))  # so that rounding errors do not add up
+    # whole steps, so that deviations of single positions do not add up
+    place = np.append(0.0, np.cumsum(np.rint(apart / np.median(apart))))
     step, origin = np.polyfit(place, middles, 1)
     nearest = np.rint((positions - origin) / step)
     own = np.repeat(place, [line.size for line in lines])
@@ -106,7 +112,8 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
     """Arrange points, which are given in any order, in rows of heights; return the rows and the steps along x and y.
 
-    Missing points become NaN. Raise DataError if two points have the same position or the grid is not regular.
+    Grid points without a height become NaN. Raise DataError if two points have the same position or if the grid is not
+    regular.
     """
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1
@@ -120,9 +127,10 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Also return remarks.
 
-    The largest number is replaced if its distance from all other heights exceeds the range of these other heights; so
-    is the smallest number. A number that occurs once may belong to a deep groove: its distance must exceed `FAR_ALONE`
-    times the range. A surface with at most `FEW_LEVELS` different heights, such as a grating, stays as it is.
+    The largest number is replaced if its distance from the next smaller number exceeds the range of all numbers between
+    the smallest and the largest. The same applies to the smallest number. If such a number occurs only once, it may be
+    the height of a narrow groove or peak; it is replaced only if its distance exceeds `FAR_ALONE` times the range. A
+    surface with at most `FEW_LEVELS` different heights between the two, such as a grating, is left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

@@ -1,4 +1,7 @@
-"""The four kinds of lines. Heights are in units of the rms height, and lengths in units of the length of the line."""
+"""The four kinds of rough lines: generated, with the spectrum of a surface, measured, and smooth.
+
+Heights are divided by the rms height of the line, and positions by its length.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Generated:
-    """Self-affine roughness. The realisations have the same amplitudes, and different random phases."""
+    """Generated self-affine roughness. All realisations have the same amplitudes, but different random phases."""
 
     hurst: float
     points: int
@@ -27,7 +30,7 @@ class Generated:
     is_random = True
 
     def waves(self, seed: int, realisation: int) -> Waves:
-        """Return one realisation; raise ValueError if there is no wave between the cut-off wavelengths."""
+        """Return one realisation; raise ValueError if no wave lies between the cut-off wavelengths."""
         return _with_random_phases(_amplitudes(self), self.points, seed, realisation)
 
     def slope(self, realisation: int) -> float:
@@ -97,7 +100,7 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The measured profile of a file, the same line in every realisation."""
+    """The measured profile of a file. All realisations are this same line."""
 
     profile: ProfileFile
     is_random = False
@@ -130,7 +133,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A line without roughness. A solver chooses its grids from the number `points`."""
+    """A line without roughness. Solvers choose their grids from `points`, as for a line with this number of points."""
 
     points: int
     is_random = False

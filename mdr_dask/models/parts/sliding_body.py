@@ -37,7 +37,7 @@ NUMBERS = (
 class SlidingBody(Parameters):
     """A viscoelastic body that slides over a rough line.
 
-    The roughness is generated or measured. It lies on a plane or on the surface of an indenter.
+    The rough line is generated or measured. The roughness is added to a plane or to the shape of an indenter.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -96,7 +96,7 @@ class SlidingBody(Parameters):
             if self.hurst is None:
                 raise ValueError("expected hurst, because generated roughness needs it, got none")
         elif both:
-            raise ValueError(f"surface replaces {', '.join(both)}: leave out one or the other")
+            raise ValueError(f"surface replaces {', '.join(both)}: leave out surface, or {', '.join(both)}")
         elif self.surface.profile is not None and self.length is not None:
             raise ValueError("the length of surface: {profile: ...} comes from its file: leave out length")
         elif self.surface.profile is None and self.length is None:
@@ -122,7 +122,7 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note for each material that compares the frequencies of a study with the frequencies of the data.
+    """Return notes on whether the moduli of each material are known at the frequencies of a study.
 
     At the sliding velocity v, a wave of the roughness with the wave number q excites the angular frequency q v.
     """
@@ -142,7 +142,7 @@ def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
-    """Return a text that says how far the frequencies of a study lie outside the range of the data."""
+    """Return a text that says how far the frequencies `asked` lie outside the range `known` of the moduli."""
     (low, high), (first, last) = np.log10(asked), np.log10(known)
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:

@@ -53,10 +53,10 @@ class Setting:
 class SlidingProblems:
     """The cases of a block as dimensionless numbers. Cases with equal numbers have the same dimensionless solution.
 
-    `which` is the index into `settings` for every case, -1 for a case that cannot be solved. `loads` are F_N / (4 G_inf
-    L h) with the static shear modulus G_inf. `deborah` is eta v / (G_inf L) with the viscosity eta, which is v tau / L
-    for a Kelvin body. `length` is the length L of the line in m. `height` is the rms height h in m, or L without
-    roughness. `faults` are messages about cases that cannot be solved, by the index of the case.
+    `which` holds, for every case, its index into `settings`, or -1 if the case cannot be solved. `loads` are F_N / (4
+    G_inf L h) with the static shear modulus G_inf. `deborah` are the Deborah numbers eta v / (G_inf L) with the
+    viscosity eta; for a Kelvin body this is v tau / L. `length` is the length L of the line in m. `height` is the rms
+    height h in m, or L if there is no roughness. `faults` has a message for each index of a case that cannot be solved.
     """
 
     settings: list[Setting]
@@ -68,7 +68,10 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Yield groups of solvable cases with equal settings and equal values in the columns: setting and indices."""
+        """Yield the setting and the case indices of each group of solvable cases.
+
+        The cases of a group have the same setting and the same value in each of the columns.
+        """
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)
@@ -78,15 +81,16 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return Deborah number and load of each different case, and for every member its index among these cases."""
+        """Return the different pairs of Deborah number and load, and the index of its pair for every member."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
 
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
-    """Find the different rows of a table, which is given by its columns. Objects are compared by identity.
+    """Find the different rows of a table whose columns are given. Objects are compared by identity.
 
-    Return the first row with each combination of values, and for every row the index of its combination.
+    For each combination of values, return the index of the first row with this combination. Also return, for every row,
+    the index of its combination.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -100,7 +104,7 @@ def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
 
 
 def sliding_problems(block: Block[Any]) -> SlidingProblems:
-    """Return the cases of a block as dimensionless numbers. The parameter set of the block is any `SlidingBody`."""
+    """Return the cases of a block as dimensionless numbers. The parameters of the block are a `SlidingBody`."""
     faults: dict[int, str] = {}
     lines, which_line, length, height = _lines(block, faults)
     static, viscosity, terms, which_solid = _solids(block, faults)
@@ -137,7 +141,10 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
 
 
 def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
-    """Return the profile of an indenter, with positions divided by `length` and heights by `height`, and rounded."""
+    """Return the profile of an indenter with positions divided by `length` and heights divided by `height`.
+
+    The resulting numbers are rounded, so that cases that differ only by rounding errors have equal profiles.
+    """
     if body is None:
         return None
     body = body.scaled(float(length), float(height))
@@ -146,7 +153,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return Prony terms, with relaxation times divided by L / v, the time of sliding over the distance L."""
+    """Return Prony terms with relaxation times divided by L / v, the time of sliding over the length L."""
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -174,13 +181,13 @@ def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
 def _lines(
     block: Block[Any], faults: dict[int, str]
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
-    """Return the different lines, and for every case the index of its line, its length and its height."""
+    """Return the different lines. Also return, for every case, the index of its line, the length L and the height h."""
     length, height = block.numbers("length"), block.numbers("rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
     with np.errstate(all="ignore"):
         ends = [canonical(length / block.numbers(name)) for name in ("rolloff_wavelength", "longest_wavelength")]
-    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 if no wavelength limit is given
+    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 if the wavelength is not given
     surfaces, which_surface = each(block, "surface")
     columns = block.numbers("hurst"), block.numbers("points").astype(np.int64), *corners
     own_length = [length] if any(surface is not None for surface in surfaces) else []
@@ -208,10 +215,10 @@ def _lines(
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
-    """Return static modulus in Pa and viscosity of the dashpot over static modulus in s for every case, and the solids.
+    """Return the static modulus in Pa and the ratio of viscosity to static modulus in s, both for every case.
 
-    The solids are the Prony terms of every different solid (moduli over static modulus, and times in s), None for a
-    Kelvin solid. The last array is the index of the solid of every case.
+    Also return the Prony terms of each different solid (moduli divided by the static modulus, and relaxation times in
+    s; None for a Kelvin solid), and the index of its solid for every case.
     """
     static, viscosity = block.numbers("shear_modulus"), block.numbers("relaxation_time")
     materials, which = each(block, "material")

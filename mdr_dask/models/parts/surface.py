@@ -48,12 +48,13 @@ class Surface(Parameters):
 
     @model_validator(mode="after")
     def _one_kind(self, info: ValidationInfo) -> Surface:
-        """Raise an error for an unusable file when the campaign is read, before any case is computed."""
+        """Raise an error for wrong parameters or an unusable file when the campaign is read, before any computation."""
         self.require_one_alternative()
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
             raise ValueError(
-                "a profile is used unchanged: give its shortest and longest wavelength in profile: {file: ...}"
+                "shortest_wavelength and longest_wavelength of a profile are options of profile, without extrapolate: "
+                "write profile: {file: ..., shortest_wavelength: ...}"
             )
         if self.extrapolate and not any(ends):
             raise ValueError(
@@ -66,13 +67,13 @@ class Surface(Parameters):
         return self
 
     def without_spectrum(self) -> tuple[str, ...]:
-        """Return a sentence for each file that has no isotropic spectrum. The sentence gives the reason."""
+        """Return, for each file that has no isotropic spectrum, a sentence with the reason."""
         if self.map is None:
             return ()
         return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on wavelength range, rms height and rms gradient of the spectra."""
+        """Return notes on the wavelength range, the rms height and the rms gradient of each spectrum."""
         if self.profile is not None:
             return ()
         spectra = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
@@ -111,7 +112,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the data of a parameter set. If the surface is measured, the Hurst exponent is None unless it is given."""
+    """Return the given parameters, with ``hurst: None`` if a measured surface is given and no Hurst exponent."""
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
 
@@ -129,7 +130,7 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between the cut-offs. Without `shortest_wavelength`, the spectrum ends where noise begins."""
+    """Return a spectrum between its cut-offs. If `shortest_wavelength` is not given, it ends where noise begins."""
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:
@@ -152,7 +153,8 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
     """Return the amplitudes, in m, of the lines that replace a surface in the method of dimensionality reduction (MDR).
 
-    There is one line for each file. Raise DataError if no wave of the line lies in the range of the spectrum.
+    There is one line for each file of the surface. Raise DataError if no wave of a line lies within the wavelengths of
+    its spectrum.
     """
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):

@@ -22,13 +22,16 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # assumed relative error of every point of a tabulated spectrum of straight profiles
-# a surface counts as isotropic up to this anisotropy; the slopes along x and y then differ by at most about a quarter
+# A surface counts as isotropic if its anisotropy does not exceed this. The slopes along x and y then differ by at most
+# about a quarter.
 MOST_ANISOTROPY = 0.25
-STRIPES = 10.0  # a map has stripes if waves along an axis have more than this times the mean power of their ring
-FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
-MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they count as parts of the surface
+STRIPES = 10.0  # stripes: waves along an axis have more than this times the mean power of equally long waves
+FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of their mean square
+# If more than this fraction of the points lie far from their neighbours, these points belong to the surface and are not
+# outliers.
+MOST_OUTLIERS = 0.05
 
-#: Columns of a table of a spectrum.
+#: Columns of a table that contains a spectrum.
 COLUMNS = (
     Column("wavenumber", "rad/m", needed=False, above=0),
     Column("wavelength", "m", needed=False, above=0),
@@ -42,7 +45,7 @@ COLUMNS = (
 class Found(NamedTuple):
     """The spectrum C2D of a file within the range of the data.
 
-    `resolution` is the wavelength in m below which there is only noise, 0 if no noise was found.
+    `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found.
     """
 
     spectrum: Spectrum
@@ -75,7 +78,7 @@ class SpectrumTables(Files):
 
 
 class HeightFiles(Files):
-    """Heights along lines or on areas of a surface."""
+    """Files with heights of a surface: line scans or maps."""
 
     spacing: float | None = quantity(
         "m",
@@ -125,7 +128,7 @@ class MapFiles(HeightFiles):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with column names of a spectrum: two such names, or one of several letters."""
+    """Return whether a text begins with column names of a spectrum. A single name of one letter is not enough."""
     try:
         sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
     except DataError:
@@ -187,7 +190,10 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola explains most of the levelled heights: they may contain the form of the part."""
+    """Return a warning if a parabola fits the levelled heights well: then they may contain the form of the part.
+
+    `level` are the heights without a fitted plane or line, and `curved` the heights without a fitted parabola.
+    """
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
     if not rest < (1 - FORM) * square:
         return ()
@@ -221,7 +227,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map, averaged over all directions or found from profiles along the given direction."""
+    """Return the spectrum of one map: the mean over all directions, or that of profiles along the sliding direction."""
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
@@ -253,8 +259,8 @@ def anisotropic(maps: MapFiles, file: DataFile) -> str:
 class LevelledMap(NamedTuple):
     """A map after its trend is subtracted.
 
-    `height_rms` and `height_mean` are Sq and Sa of the measured points in m. `spectrum` is the spectrum of the windowed
-    map, with missing points filled.
+    `height_rms` and `height_mean` are Sq and Sa of the measured points in m. `spectrum` is computed after
+    missing points are filled in and the window is applied.
     """
 
     height_rms: float

@@ -1,4 +1,4 @@
-"""Report on the files of a measured surface: heights, slopes, spectra, fitted power law, resolution."""
+"""Report on each file of a measured surface: heights, slopes, spectra, fitted power law, resolution."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ UNITS = {
 
 * Sq and Sa: rms height and mean absolute height of the levelled map. Pq: rms height of the levelled profile. These
 three are computed without a window; gradient, slopes and anisotropy are computed from the windowed heights.
-* hurst, rolloff and cutoff: Hurst exponent, longest and shortest wavelength of the fitted power law, each with the ends
-of its interval.
+* hurst, rolloff and cutoff: Hurst exponent, longest and shortest wavelength of the fitted power law, each with the
+ends of its 95 % confidence interval (`_low` and `_high`).
 * resolution: shortest wavelength that is not only noise. length: longest wavelength of a map, length of a profile.
 """
 
@@ -52,9 +52,9 @@ of its interval.
 class FileReport(NamedTuple):
     """Report on one file.
 
-    `row` has the values of the columns of `UNITS`, and `bins` has C2D in logarithmic bins with relative errors. `cuts`
-    are wave numbers and power spectrum, in m^3, of straight profiles in each direction. `law` is None if no power law
-    fits.
+    `row` contains a value for each name in `UNITS`. `bins` contains C2D and its relative error in logarithmic bins.
+    `cuts` contains the wave numbers and the power spectrum, in m^3, of straight profiles along "x", and for a map along
+    "y" too. `law` is the fitted power law, or None if no power law fits.
     """
 
     file: DataFile
@@ -119,8 +119,8 @@ def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray
     """Return the mean of several spectra at the wave numbers of the first one, and the relative standard error of the
     mean.
 
-    At each wave number, the mean includes only the spectra that contain this wave number. The error is NaN for a single
-    spectrum.
+    At each wave number, the mean includes only the spectra whose range contains this wave number. If there is only one,
+    the standard error is NaN.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

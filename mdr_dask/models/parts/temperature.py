@@ -1,4 +1,7 @@
-"""Parameters of temperature laws: the factor a_T of relaxation times between two temperatures."""
+"""Parameters of temperature laws, which give the factor a_T.
+
+The relaxation times at a temperature are those at the reference temperature, multiplied by a_T.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ class Arrhenius(Parameters):
 
 
 class ShiftFactors(NamedByFile):
-    """Measured shift factors, given by a file name or by `file: name`."""
+    """Measured shift factors. The user writes the name of a file alone, or `file: name`."""
 
     file: NamedFile = Field(
         description="table with the columns temperature, and a_T or log10 a_T; a_T must pass through 1"
@@ -82,7 +85,7 @@ class ShiftFactors(NamedByFile):
 
 @lru_cache(maxsize=16)
 def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
-    """Return the temperatures of a table and log10 a_T. Temperatures are in ascending order, so log10 a_T decreases."""
+    """Return the temperatures of a table, in ascending order, and log10 a_T at these temperatures, which decreases."""
     name = factors.file.name
     columns = (
         Column("temperature", "K", above=0),
@@ -91,7 +94,7 @@ def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
     )
     table = read_table(factors.file.read_text(), name, columns)
     if ("a_T" in table) == ("log10 a_T" in table):
-        raise DataError(f"{name}: expected one of the columns a_T and log10 a_T")
+        raise DataError(f"{name}: expected either a column a_T or a column log10 a_T")
     decades = np.log10(table["a_T"]) if "a_T" in table else table["log10 a_T"]
     order = np.argsort(table["temperature"])
     temperature, decades = table["temperature"][order], decades[order]

@@ -23,7 +23,7 @@ PAGE = "docs/validity.md"
 
 
 def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note if loads of a study exceed `LARGEST_LOAD`."""
+    """Return a note if the largest load of a study exceeds `LARGEST_LOAD`."""
     from mdr_dask.models.parts.material import solid_of
 
     loads = []
@@ -34,7 +34,7 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
         try:
             modulus = one.shear_modulus if one.material is None else solid_of(one.material).static_modulus
             height, force = OfSurface(one.surface, one.points, one.length).height(), one.largest_force()
-        except (DataError, ValueError):  # the solver reports this problem for each case
+        except (DataError, ValueError):  # the solver reports the same problem for each case that has it
             continue
         loads.append(force / (4 * (modulus or np.inf) * one.length * height))
     largest = max(loads, default=0.0)
@@ -47,10 +47,11 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
-    """Return messages about cases outside the tested range, by the index of the case.
+    """Return a dict from the index of a case to a message, for all cases outside the tested range.
 
-    `loads` are F_N / (4 G_inf L h), and `fractions` are fractions of the line in contact; for a history, the largest
-    values during the history. Only plane bodies with the spectrum of a measured surface are checked.
+    `loads` are F_N / (4 G_inf L h), and `fractions` are the fractions of the line in contact. For a loading history,
+    both are the largest values during the history. Only plane bodies with the spectrum of a measured surface are
+    checked; other bodies give no messages.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}
