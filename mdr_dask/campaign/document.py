@@ -21,7 +21,7 @@ _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50  # largest number of nesting levels; no campaign has more than ten, and Python can read about 1000
 _LARGEST = 200_000  # largest number of values in a file; with YAML aliases, a short text can stand for billions
 _LONGEST = 300_000  # largest number of characters in a file; reading so many takes about a second
-_TOO_DEEP = "too deeply nested, or an alias that contains itself"
+_TOO_DEEP = "too deeply nested, too many values, or an alias that contains itself"
 _MOST_DIGITS = 300  # largest number of digits of a number; a double has at most 309 before its decimal point
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 

@@ -19,17 +19,18 @@ _HEAD = """\
 # yaml-language-server: $schema=campaign.schema.json
 #
 # {summary}
-#   mdr-dask schema -o campaign.schema.json    lets an editor complete and check as you type
+#   mdr-dask schema -o campaign.schema.json    lets an editor complete and check this file
 #   mdr-dask check {file}
 #   mdr-dask run {file}
 #
-# A number carries its unit; a bare one is in SI. To vary a parameter, give it a list, {{linear: [a, b, n]}} or
-# {{geometric: [a, b, n]}}. What has a # in front is optional; its value there is the default, or an example.
+# Write numbers with their units; a number without a unit is in SI. To vary a parameter, write a list,
+# {{linear: [a, b, n]}} or {{geometric: [a, b, n]}}. A line that begins with # is optional: it shows the default, or an
+# example.
 name: {name}
 model: {model}
 seed: 1
 realisations: 1                     # samples of each case with other random numbers; for a mean, 20 or more
-# sampling: zip                     # or {{sobol: 100}}, {{latin_hypercube: 100}}, {{table: cases.csv}}; else a grid
+# sampling: zip                     # or {{sobol: 100}}, {{latin_hypercube: 100}}, {{table: cases.csv}}; default: a grid
 # accuracy: 1 %                     # error allowed for the outputs
 
 parameters:

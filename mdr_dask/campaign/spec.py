@@ -166,7 +166,7 @@ class CampaignSpec(Parameters):
         min_length=1,
         description="named groups of cases; in each group, the given parameters replace those under `parameters`",
     )
-    sampling: Sampling = Field("grid", description="how the values of the varied parameters are combined to cases")
+    sampling: Sampling = Field("grid", description="how the values of the varied parameters are combined into cases")
     measured: MeasuredSpec | None = Field(
         None,
         description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that are "

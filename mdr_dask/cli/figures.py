@@ -46,7 +46,9 @@ class Drawing(click.Command):
 @select_option
 @where_option
 @click.option(
-    "--log", metavar="[x][y][z]", help="Logarithmic axes: letters of xyz (z: colours), or none.  [chosen by the data]"
+    "--log",
+    metavar="[x][y][z]",
+    help="Logarithmic axes: some of the letters x, y and z (colours), or none.  [chosen from the data]",
 )
 @units_option
 @click.option("--measured", metavar="FILE", help="Also draw the measured points of this table, with error bars.")

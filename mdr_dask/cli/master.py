@@ -38,19 +38,19 @@ KEPT = (".json", ".csv")
     "--of",
     "ordinates",
     multiple=True,
-    help="Ordinate: a column such as friction_coefficient or modulus; twice for storage and loss modulus together.",
+    help="Ordinate: a column such as friction_coefficient or modulus. Give it twice for storage and loss modulus.",
 )
 @click.option("--by", help="Quantity in which the curves differ: a column such as velocity or temperature.")
 @click.option(
     "--vertical",
     type=click.Choice(["none", "modulus", "compliance", "free"]),
-    help="Factors along the ordinate: b_T and an offset of some per cent (the default for a modulus or compliance), "
-    "unknown factors (free), or none.",
+    help="Factors of the ordinate. modulus, compliance: b_T and an offset of some per cent (the default for these "
+    "quantities); free: unknown factors; none: no factors.",
 )
 @click.option(
     "--reference",
     type=float,
-    help="Value of --by at which the factors are zero, in its unit; it may lie between the groups.",
+    help="Value of --by at which the factors are zero, in the unit of --by. It may lie between the measured values.",
 )
 @click.option(
     "--keep",

@@ -119,7 +119,7 @@ _QUESTION = (
         "--sort",
         multiple=True,
         metavar="[-]COLUMN",
-        help="Sort the rows by this column, with - the largest first; may be repeated.",
+        help="Sort the rows by this column; -COLUMN puts the largest value first. May be repeated.",
     ),
     click.option(
         "--columns",

@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     "--case-timeout",
     type=click.FloatRange(min=0, min_open=True),
     metavar="SECONDS",
-    help="Record a case that takes longer as failed.",
+    help="Time limit of a case; a case that takes longer is recorded as failed.",
 )
-@click.option("--retry-failed", is_flag=True, help="Compute the cases again that failed or did not converge.")
+@click.option("--retry-failed", is_flag=True, help="Compute failed and not converged cases again.")
 @click.option(
     "--log", type=click.Path(dir_okay=False, path_type=Path), help="Append the events of the run to FILE as JSON lines."
 )
@@ -185,4 +185,4 @@ def _print_failed(url: str, progress: Progress) -> None:
 def _shared(progress: Progress) -> str:
     """Return a text with the fraction of results that used the solution of another result, or an empty text."""
     share = 1 - progress.solves / max(progress.done, 1)
-    return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""
+    return f" ({share:.1%} of the results needed no solve of their own)" if progress.solves and share > 0 else ""

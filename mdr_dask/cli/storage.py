@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Write metadata again; remove damaged blocks and coordinates for the next run.",
 )
-@click.option("--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most lines; 0 for all.")
+@click.option(
+    "--limit",
+    type=click.IntRange(min=0),
+    default=40,
+    show_default=True,
+    help="Largest number of lines to print; 0 for all.",
+)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     """Read every file of a store, and list damaged, missing and foreign files; exit code 1 if there are any.

@@ -21,13 +21,17 @@ KINDS = ("map", "scan", "spectrum")
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False))
-@click.option("--as", "kind", type=click.Choice(KINDS), help="What the files are.  [from their content]")
-@click.option("--spacing", help="Distance between points, if the file has heights alone, such as 2um.")
+@click.option("--as", "kind", type=click.Choice(KINDS), help="Kind of the files.  [found from their content]")
+@click.option("--spacing", help="Distance between points, such as 2um, if the file contains only heights.")
 @click.option("--spacing-y", help="Distance between rows, if different from --spacing.")
 @click.option("--unit", help="Unit of the heights, if the file has none.")
 @click.option("--x-unit", help="Unit of positions in the file, if the file has none.")
-@click.option("--detrend", help="none, mean, plane (of a map), line (of a scan) or parabola.")
-@click.option("--window", type=click.Choice(("hann", "none")), help="none only of a periodic surface.  [hann]")
+@click.option("--detrend", help="Shape to subtract: none, mean, plane (of a map), line (of a scan) or parabola.")
+@click.option(
+    "--window",
+    type=click.Choice(("hann", "none")),
+    help="Window of the heights; none only for a periodic surface.  [hann]",
+)
 @click.option(
     "--outliers", type=click.Choice(("keep", "fill")), help="Keep or replace points far from their neighbours.  [keep]"
 )

@@ -73,7 +73,7 @@ def test_an_alias_is_its_anchor():
 def test_aliases_of_aliases_do_not_fill_the_memory():
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]
-    with pytest.raises(CampaignError, match="too deeply nested, or an alias that contains itself"):
+    with pytest.raises(CampaignError, match="too deeply nested, too many values, or an alias that contains itself"):
         read("\n".join(lines))
 
 
