@@ -20,23 +20,24 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations that a block of a large study should need. Such a block takes about a second to compute, but
+#: Number of operations that a block of a large study should need. Such a block takes about a second to compute, and
 #: only milliseconds to schedule and to write.
 OPERATIONS = 1e9
-#: A small study is cut into about this number of blocks, so that several workers can share it, but a block needs at
+#: A small study is cut into about this number of blocks, so that several workers can share it, but each block gets at
 #: least `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share work are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
-#: Smaller blocks are halved only if the total number of operations then grows by less than this factor.
+#: Blocks of up to `MOST_SHARED` operations are halved only if the total number of operations then grows by less than
+#: this factor.
 REPEATED_WORK = 1.15
 #: Largest number of blocks of a series whose operations are counted one by one, so that `check` is fast.
 SAMPLED = 1000
-#: Largest number of records that are merged into one file, of about a megabyte.
+#: Largest number of records that are merged into one file. Such a file has about a megabyte.
 RECORDS_TOGETHER = 1000
-#: Largest chunk of one array, in bytes: a task holds one such chunk for each output.
+#: Largest size of a chunk, in bytes. A task holds one chunk of each output in memory.
 CHUNK_BYTES = 64 * 2**20
-#: Largest number of results of a series; a larger number is taken to be a mistake in the file.
+#: Largest number of results of a series; a larger number is taken to be a mistake in the campaign file.
 MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
@@ -52,9 +53,9 @@ class Template:
     sizes: Mapping[str, int]
     # Length of a block along each dimension.
     chunks: Mapping[str, int]
-    # The arrays, without ``status``.
+    # The outputs. Each output is one array of the group; the array ``status`` is not among them.
     outputs: tuple[Output, ...]
-    # Coordinates of the further dimensions of outputs, by dimension.
+    # Coordinates of the dimensions of outputs that are neither case dimensions nor ``realisation``.
     extra: Mapping[str, Coordinate]
 
     @property
@@ -78,12 +79,12 @@ class Template:
         return tuple(math.ceil(size / self.chunks[dim]) for dim, size in self.sizes.items())
 
     def extra_shape(self, output: Output) -> tuple[int, ...]:
-        """Return the lengths of the further dimensions of an output, other than cases and realisations."""
+        """Return the lengths of the dimensions of an output that are neither case dimensions nor ``realisation``."""
         return tuple(self.extra[dim].values.size for dim in output.dims)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the model, and of parameter sets that differ from the first one by a value of one axis."""
+        """Notes on the parameters of the series, also with one of them replaced by a value of an axis."""
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -104,7 +105,7 @@ class Template:
         return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 1
 
     def block_indices(self) -> Iterator[BlockIndex]:
-        """Yield the indices of all blocks, those with the first realisations of all cases first."""
+        """Yield the indices of all blocks, beginning with the blocks of the first realisations of all cases."""
         *cases, realisations = (range(count) for count in self.grid)
         for last in realisations:
             for index in itertools.product(*cases):
@@ -124,7 +125,8 @@ class Template:
     def operations(self, index: BlockIndex) -> float:
         """Return the approximate number of operations of a block.
 
-        The operations are counted for the first realisations of the same cases, and reduced in proportion for fewer.
+        The operations are counted for the block with the same cases and the first realisations. If the given block has
+        fewer realisations than that block, the number is reduced in proportion.
         """
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
@@ -136,7 +138,8 @@ class Template:
     def _operations(self, block: Block[Any]) -> float:
         """Return the number of operations of a block.
 
-        If the model does not count operations, a study gets as many blocks as a block has results.
+        If the model does not count operations, return a number with which a study of N results gets about sqrt(N)
+        blocks.
         """
         count = models.load(self.campaign.model).operations
         if count is not None:
@@ -173,7 +176,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block of the given lengths for estimates, at a position in the group from 0 (first) to 1 (last)."""
+        """Return a block of the given lengths for estimates, at a `position` in the group from 0 (start) to 1 (end)."""
         starts = self._starts(chunks, position)
         return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
 
@@ -181,7 +184,7 @@ class Template:
         return {dim: round(position * (size - chunks[dim])) for dim, size in self.sizes.items()}
 
     def mean_operations(self, chunks: Mapping[str, int]) -> float:
-        """Return the mean number of operations of the first, middle and last block of the given lengths."""
+        """Return the mean number of operations of the first, the middle and the last block of the given lengths."""
         known, found = self._known, []
         for position in (0.0, 0.5, 1.0):
             key = tuple(self._starts(chunks, position).values()), tuple(chunks.values())
@@ -235,8 +238,8 @@ def templates(
 ) -> tuple[Template, ...]:
     """Lay out every series of a checked campaign for a number of realisations.
 
-    `stored_chunks` are the chunk lengths of existing groups, by the name of the series. Raise CampaignError with all
-    problems if a series has too many results or a case needs too much memory.
+    `stored_chunks` maps the name of each series that is already in the store to its chunk lengths. Raise CampaignError
+    with all problems if a series has too many results or a case needs too much memory.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -288,22 +291,22 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
 
 
 def available_memory() -> float:
-    """Return the memory of this machine in bytes, or the limit of its control group if that is smaller."""
+    """Return the memory of this machine in bytes, or the memory limit of its control group if the limit is smaller."""
     import psutil
 
     limits = [psutil.virtual_memory().total]
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
-        with suppress(OSError, ValueError):  # no such group, or no limit
+        with suppress(OSError, ValueError):  # there is no such file, or it states no limit
             limits.append(int(Path(path).read_text()))
     return float(min(limits))
 
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
-    """Return the lengths of a block along each dimension.
+    """Return the length of a block along each dimension.
 
-    A block first gets all values of the axes along which cases share work, as far as it does not become too large. If
-    it still has few operations, it gets more realisations, then more values of the other axes, and finally the
-    realisations of later rounds.
+    A block first gets all values of the axes along which cases share work; if this makes it too large, its lengths
+    along these axes are halved. If the block still has few operations, it gets more realisations, then more values of
+    the other axes, and finally the realisations of later rounds.
     """
     shared = (
         axis.dim for path in model.whole for axis in template.series.axes if f"{axis.path}.".startswith(f"{path}.")
@@ -333,10 +336,10 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
 
 
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
-    """Return whether blocks with more than `most` operations are halved along `dim`, along which cases share work.
+    """Return whether to halve blocks along `dim`, a dimension along which cases share work.
 
-    Up to `MOST_SHARED` operations, they are halved only if the halves repeat little of the shared work
-    (`REPEATED_WORK`).
+    Blocks of at most `most` operations are not halved, and blocks of more than `MOST_SHARED` operations are always
+    halved. Blocks in between are halved only if the halves repeat little of the shared work (`REPEATED_WORK`).
     """
     now = template.mean_operations(chunks)
     if now <= most or now > MOST_SHARED:
@@ -347,7 +350,7 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
 
 
 def _part(template: Template, dim: str, most: int) -> int:
-    """Return the length of the nearly equal parts, of at most `most`, into which a dimension is cut.
+    """Cut a dimension into nearly equal parts that are at most `most` long, and return their length.
 
     If rounds add realisations, the length along ``realisation`` divides the number of realisations of the first round.
     """
@@ -359,7 +362,7 @@ def _part(template: Template, dim: str, most: int) -> int:
 
 
 def estimate(campaign: Campaign) -> Estimate:
-    """Return the costs of a campaign without running it; raise CampaignError if it is too large to be run."""
+    """Return the costs of a campaign without running it; raise CampaignError if the campaign is too large to be run."""
     model, replication = models.load(campaign.model), campaign.replication
     layout = templates(campaign, replication.at_least)
     cases = sum(template.cases for template in layout)
@@ -388,7 +391,7 @@ def _growth(series: Series) -> float:
 
 
 def _operations_and_solves(template: Template, model: Model[Any]) -> tuple[float, int]:
-    """Estimate the operations and solutions of a series from at most `SAMPLED` blocks of the first realisations."""
+    """Estimate the numbers of operations and solutions of a series from at most `SAMPLED` of its blocks."""
     lengths, realisations = template.grid[:-1], template.sizes["realisation"]
     blocks = math.prod(lengths)
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)

@@ -1,4 +1,4 @@
-"""One task: compute a block, write it, and return its counts."""
+"""One task: compute a block, write it to the store, and return how many results are done, failed or not needed."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Work:
 
     place: Place
     model: str
-    # Versions of the program and of the model in the driver, the process that started the run.
+    # Versions of the program and of the model in the driver (the process that started the run).
     versions: tuple[str, int]
     block: Block[Any]
     # Masks with the shape of the block: results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
-    # Number of times that the computation of the block was started, including this one.
+    # Number of times that the computation of the block has been started, including this time.
     attempt: int
     operations: float
 
@@ -59,8 +59,8 @@ class Work:
 class Outcome:
     """The return value of a task: counts and times, but no results.
 
-    `counts` is indexed by `Status`. `compile_seconds` is the part of `compute_seconds` in which this process compiled
-    kernels. `warned` is the number of results that are done but have a warning.
+    `counts` has the number of results in each state of `Status`. `compile_seconds` is the part of `compute_seconds` in
+    which this process compiled kernels. `warned` is the number of results that are done but have a warning.
     """
 
     counts: tuple[int, ...]
@@ -119,12 +119,13 @@ def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
 #: Errors that come from a fault of the machine and not from a case: for example, the cache of the compiler is broken, a
 #: disk is full, or a library is missing.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Longer messages are cut to this number of characters before they are stored, because each failed result has one.
+#: Longer messages are cut to this number of characters before they are stored, because every failed result has a
+#: message.
 LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model for a block; if it raises an exception, call it for each result, to find the results that fail.
+    """Call the model for a block; if that raises an exception, call it for each result, to find out which fail.
 
     If the user wrote the model (`is_own`), every exception counts as a failed case, and the results are checked.
     """
@@ -155,7 +156,7 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     """Return the checked result of a model that the user wrote; results with invalid values are marked as failed.
 
-    Raise TypeError or ValueError if the result lacks a declared output, or has another shape or status than declared.
+    Raise TypeError or ValueError if the result lacks a declared output, or if a shape or a status is not as declared.
     """
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")
@@ -225,7 +226,7 @@ def _compute_part(
     values: dict[str, NDArray[np.float64]],
     status: NDArray[np.int8],
 ) -> Result:
-    """Compute the wanted results of a block into `values` and `status`, which already hold its other results."""
+    """Compute the wanted results of a block, and write them into `values` and `status` beside the other results."""
     flat_status = status.reshape(wanted.shape)
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:
@@ -278,7 +279,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
 
 
 def _place(work: Work, case: int, number: int) -> list[int]:
-    """Return the indices of a result in the ledger."""
+    """Return the indices of a result in the ledger, from the number of its case and of its realisation in the block."""
     region = work.place.region
     shape = [part.stop - part.start for part in region]
     inside = [int(offset) for offset in np.unravel_index(case, shape[:-1])] if len(shape) > 1 else []
@@ -292,7 +293,7 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return the processor and the numerical libraries, on which the last digits of results may depend.
+    """Name the processor and the numerical libraries, because the last digits of results may depend on them.
 
     Child processes read this text from the environment variable `KIND`, so that they need not import SciPy.
     """
@@ -323,7 +324,7 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Mark the results of a task as failed without computing them, because they crash the process."""
+    """Mark the results of a task as failed without computing them, because computing them crashes the process."""
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED

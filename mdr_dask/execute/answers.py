@@ -17,8 +17,8 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
 
-#: Smallest number of realisations from which the interval of a fitted constant is computed: a bootstrap of fewer
-#: underestimates the scatter.
+#: Smallest number of realisations from which the interval of a fitted constant is computed: from fewer realisations,
+#: the bootstrap underestimates the scatter.
 FEWEST = 10
 
 
@@ -27,8 +27,8 @@ def cases_that_narrow(
 ) -> list[BoolArray]:
     """Return the cases that need more realisations, because they affect a constant whose interval is too wide.
 
-    Until some case has `FEWEST` realisations, all new cases of the stage need more. `places` are the positions of the
-    cases of the stage in the store; `taken` are the numbers of realisations that are used of every case.
+    As long as every case has fewer than `FEWEST` realisations, all new cases of the stage need more. `places` are the
+    positions in the store of the cases of the stage; `taken` has the number of realisations of each case that are used.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -52,7 +52,7 @@ def cases_that_narrow(
 
 
 def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
-    """Yield one sentence or more for every fitted constant that does not meet its tolerance."""
+    """Yield sentences about the fitted constants that do not meet their tolerances."""
     answers = stage.campaign.replication.answers
     groups = _groups(url, stage, layout, taken)
     known = fits.available(stage.campaign.model)
@@ -77,11 +77,11 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the results of every series, without failed realisations and those beyond the number in `taken`."""
+    """Return the results of every series; failed realisations, and those beyond the number in `taken`, become NaN."""
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # results without series, at the root
+        data = opened[name if name in opened else next(iter(opened))]  # the group at the root may have another name
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}
@@ -98,6 +98,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return a mask of cases as an array over the axes of the series, in their order."""
+    """Return a mask of cases as an array whose dimensions and values have the order of the series."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

@@ -1,7 +1,8 @@
 """Compute blocks in child processes of this machine, because a block may crash its process or take too long.
 
-A server process imports all modules and forks the children, which read blocks from pipes and write outcomes to them.
-If a child dies, the server reports this through the pipe of the child, and forks a new child for this pipe.
+A server process imports all modules and forks the children, which read blocks from pipes and write the outcomes to the
+same pipes. If a child dies, the server reports this through the pipe of the child, and forks a new child that uses the
+same pipe.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
 #: Code that the server process runs.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
-#: Environment variables that limit libraries for linear algebra to one thread. To set a variable, the library need not
-#: be imported.
+#: Environment variables that limit libraries for linear algebra to one thread. They can be set before any of these
+#: libraries is imported.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: Time in s between the time limit of a case and the moment when its process is killed. A case in plain Python raises
-#: TimeoutError at the limit, so its process need not be killed.
+#: Time in s between the time limit of a case and the moment when its process is killed. Usually the process need not be
+#: killed, because a case in plain Python raises TimeoutError at the limit.
 GRACE = 1.0
 #: If this number of results of a case have crashed their process, the other results of the case are marked as failed:
-#: each crash costs a process, and a case may have thousands of realisations.
+#: after each crash a new process is started, and a case may have thousands of realisations.
 MOST_CRASHES = 2
 
 
@@ -56,7 +57,7 @@ class Child:
     def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
         """Compute a block in the child process, with at most `limit` seconds for each result.
 
-        If the store cannot be written or the machine has a fault, raise the error that the child has raised.
+        If the child raises an error, for example because it cannot write to the store, raise the same error here.
         """
         try:
             self.pipe.send((work, limit))
@@ -104,10 +105,11 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 
 
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
-    """Compute a block that may crash its process; if it does, compute its halves, and so on down to single results.
+    """Compute a block that may crash its process.
 
-    A single result that crashes its process is marked as failed. After `MOST_CRASHES` crashes of a case, its other
-    results are marked as failed too.
+    If the process crashes, each half of the block is computed alone, and so on down to single results. A single result
+    that crashes its process is marked as failed. If `MOST_CRASHES` results of a case have crashed their process, the
+    other results of the case are marked as failed too.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()
@@ -133,10 +135,10 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 
 def serve(model: str, numbers: list[int]) -> None:
-    """Import the modules that blocks need, and keep a child for each pipe until the driver closes the pipe."""
+    """Import the modules that blocks need, and run one child for each pipe until the driver closes the pipe."""
     # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(Exception):  # ignore an error here, because the first block will raise it again
+    with suppress(Exception):  # an error is ignored here: the first block raises it again
         models.load(model)
     pipes = [Connection(number) for number in numbers]
     served = {_fork(pipe, pipes): pipe for pipe in pipes}
@@ -146,13 +148,13 @@ def serve(model: str, numbers: list[int]) -> None:
         if status == 0:
             pipe.close()
             continue
-        with suppress(OSError):  # the driver has died, and the next child ends at once
+        with suppress(OSError):  # if the driver has died: the new child then ends at once
             pipe.send(Crash(_describe(status)))
         served[_fork(pipe, pipes)] = pipe
 
 
 def _fork(pipe: Connection, pipes: list[Connection]) -> int:
-    """Fork a child that computes the blocks of a pipe, and return its process number."""
+    """Fork a child that computes the blocks that arrive through a pipe, and return the process number of the child."""
     child = os.fork()
     if child == 0:
         for other in pipes:

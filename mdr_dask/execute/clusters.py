@@ -28,10 +28,10 @@ from mdr_dask.task import one_blas_thread
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
-#: Time in which an adaptive cluster should finish all waiting tasks. Dask starts as many workers as necessary. One
-#: block takes about this time.
+#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time. One block
+#: takes about the same time.
 TARGET_DURATION = "1s"
-#: Loggers whose messages explain why workers cannot be started. Messages of the run quote these messages.
+#: Loggers whose messages explain why workers cannot be started. Messages of the run quote the last of these messages.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
 #: Loggers whose messages are discarded, because they only repeat errors that are reported anyway.
 ECHOES = ("distributed", "asyncio")
@@ -65,7 +65,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        # the workers of a client that the user gives may be threads of this process
+        # needed if the workers of a client that the user gives are threads of this process
         stack.enter_context(one_blas_thread())
         most: int = 0
         replace_lost: Callable[[], None] | None = None
@@ -90,7 +90,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
 
 
 def _require_guard() -> None:
-    """Raise ClusterError if a script without ``if __name__ == "__main__"`` starts processes, which import it."""
+    """Raise ClusterError if a script lacks ``if __name__ == "__main__"``: worker processes import the script."""
     main = sys.modules.get("__main__")
     source = getattr(main, "__file__", None)
     frame = sys._getframe()
@@ -104,7 +104,7 @@ def _require_guard() -> None:
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them, because Dask adds handlers to both kinds of loggers."""
+    """Return the named loggers and all loggers below them, because Dask adds handlers to loggers at both levels."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 
@@ -145,12 +145,12 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
         try:
             yield cluster
         finally:
-            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # raised if workers were never started
+            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # if no worker was ever started
                 cluster.close()
 
 
 def cluster_class(name: str) -> type[Cluster]:
-    """Return the class with a dotted name; raise ClusterError if it is not a class of Dask clusters."""
+    """Return the class of Dask clusters with the given dotted name; raise ClusterError if there is no such class."""
     package, _, attribute = name.rpartition(".")
     try:
         found = getattr(import_module(package), attribute)
@@ -162,11 +162,11 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Return arguments that keep other users out: TLS, and a web page that only this machine can open."""
+    """Add arguments that keep other users out of a cluster: TLS, and a web page that only this machine can open."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
-    elif hasattr(kind, "job_cls"):  # a cluster of batch jobs
+    elif hasattr(kind, "job_cls"):  # only clusters of batch jobs have this attribute
         own["scheduler_options"] = {"dashboard_address": DASHBOARD, **own.get("scheduler_options", {})}
     else:
         return own
@@ -189,7 +189,7 @@ def _in_files(keys: Security, folder: Path) -> Security:
 
 
 def _most(plan: Mapping[str, Any]) -> int:
-    """Return the largest number of threads that the file of a cluster allows; 0 if the file states no limit."""
+    """Return the largest number of threads that the cluster file allows; 0 if the file states no limit."""
     arguments = plan.get("arguments", {})
     adapt = plan.get("adapt", {})
     each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)

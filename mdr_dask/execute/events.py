@@ -23,7 +23,7 @@ class Event:
 
 #: Function that receives events, from any thread.
 Tell = Callable[[Event], None]
-#: Function that receives a task that has ended, with its outcome.
+#: Function that receives a finished task and its outcome.
 Settle = Callable[[Work, Outcome], None]
 
 
@@ -45,9 +45,9 @@ def ended(work: Work, outcome: Outcome) -> Event:
 class Progress:
     """The state of a run, counted in results. A result is one case in one realisation."""
 
-    # Numbers of results. `total` counts the results of all rounds so far, and `kept` the results that were in the store
-    # before the run. `done`, `failed` (including not converged) and `not_needed` count the results that this run has
-    # written.
+    # Numbers of results. `total` counts the results of all rounds that have begun, and `kept` those of them that were
+    # in the store before the run. `done`, `failed` (including not converged) and `not_needed` count the results that
+    # this run has written.
     total: int = 0
     kept: int = 0
     done: int = 0
@@ -60,7 +60,7 @@ class Progress:
     # Number of blocks and number of solutions that this run has computed. Several results may share one solution.
     blocks: int = 0
     solves: int = 0
-    # Number of operations of all rounds so far, and number of operations of the finished blocks.
+    # Number of operations of all rounds that have begun, and number of operations of the blocks that are finished.
     estimated: float = 0.0
     finished: float = 0.0
     # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the
@@ -77,7 +77,7 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimated time in s to the end of this round, from the pace of finished blocks; None before the first one.
+        """Estimated time in s to the end of this round, from the pace of finished blocks; None if no block is finished.
 
         The pace does not include the time for compiling kernels.
         """
@@ -89,7 +89,7 @@ class Progress:
         return pace * max(self.estimated - self.finished, 0.0) / side_by_side
 
     def after(self, outcome: Outcome, wall_seconds: float) -> Progress:
-        """Return the state after one more block, which ended `wall_seconds` after the start."""
+        """Return the state after one more block has ended, `wall_seconds` after the start of the run."""
         counts = outcome.counts
         return replace(
             self,

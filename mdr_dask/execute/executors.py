@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: The number of submitted blocks is this multiple of the number of threads, so that no thread is idle.
+#: Number of blocks for each thread that are submitted at the same time, so that no thread waits for its next block.
 AHEAD = 2
 
 
 class Executor(AbstractContextManager["Executor"]):
-    """Compute blocks on the given resources. Processes and clusters are started when there is work for them.
+    """Compute blocks on the given resources. Child processes are not started before there are blocks to compute.
 
-    The blocks of a plain Python model are computed in child processes, because threads would wait for each other, and
-    because a crash would end the run.
+    The blocks of a plain Python model are computed in child processes, because only one thread of a process can run
+    Python at a time, and because a crash would end the run.
     """
 
     def __init__(self, resources: Resources, model: str, tell: Tell) -> None:
@@ -49,14 +49,14 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.__exit__(*reason)
 
     def apart(self) -> None:
-        """Compute all blocks in child processes, because a case may have crashed the last run."""
+        """Compute all blocks in child processes, because a case may be the cause of a crash of the last run."""
         if hasattr(os, "fork") and not self._resources.remote and not self._is_apart:
             self._is_apart = True
             sentence = "the last run was killed or crashed: blocks are computed in child processes, to find the cause"
             self._tell(Event("after a crash", {}, sentence))
 
     def connect(self) -> None:
-        """Start the cluster or connect to it, if the resources name one. Call this before anything is written."""
+        """If the resources name a cluster, start it or connect to it. Call this before anything is written."""
         if self._resources.remote and self._window is None:
             from mdr_dask.execute.clusters import task_window
 
@@ -80,7 +80,8 @@ class Executor(AbstractContextManager["Executor"]):
     def _in_pool(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks in threads. After an error, the blocks that have started are still finished.
 
-        A second interrupt ends this wait, so the pool is not used as a context, which would wait once more.
+        A second interrupt ends this wait. The pool is not used in a ``with`` statement, because its end would wait
+        again.
         """
         pool = ThreadPoolExecutor(self._threads)
         remaining = iter(works)

@@ -13,8 +13,9 @@ class Resources:
 
     Models in plain Python use processes instead of threads, unless `threads` is given. `scheduler` is the address of a
     running Dask scheduler, `cluster` a description from `mdr_dask.campaign.cluster.load_cluster`, and `client` a Dask
-    client, which stays open. `patience`: seconds without any worker after which a run on a cluster ends with an error.
-    `case_timeout`: seconds after which a case fails; blocks are then computed in child processes.
+    client, which is not closed at the end of the run. A run on a cluster ends with an error after `patience` seconds
+    without any worker. If `case_timeout` is given, a case fails after this time in s, and blocks are computed in child
+    processes.
     """
 
     threads: int | None = None

@@ -1,8 +1,8 @@
 """Run a campaign stage after stage and round after round, until no result is missing in its store.
 
 A stage is the campaign with the values that its adaptive axes have so far. Its first round computes the first
-realisations of all cases; each further round adds realisations to the cases whose errors are still too large. Both
-follow from stored results alone, so a run can be stopped and repeated at any time.
+realisations of all cases; each further round adds realisations to the cases whose errors are still too large. The
+stored results determine the next stage and the next round, so a run can be stopped and repeated at any time.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class _Job:
 class _Round:
     """One round of a stage."""
 
-    # The shape of the store.
+    # Shape, chunks and coordinates of every group of the store.
     layout: tuple[Template, ...]
     # For each group, two masks of its cases: the cases of the stage, and the cases that need the realisations of this
     # round.
@@ -82,11 +82,11 @@ def run(
 
         require_known(campaign)
     stage = Stage.first(campaign)
-    stored_layout(stage, url)  # called here so that an error is raised before anything is locked
-    url = store.absolute(url)  # a model may change the working directory
+    stored_layout(stage, url)  # raises an error before anything is locked
+    url = store.absolute(url)  # because a model may change the working directory
     with Executor(resources, campaign.model, tell) as execute:
         if not store.exists(url):
-            execute.connect()  # connect before a new store is created
+            execute.connect()  # if this fails, no store is created
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
             if store.exists(url):
                 store.require_undamaged(url, store.series_names(url), to_run=True)
@@ -114,8 +114,8 @@ def _merge(job: _Job) -> None:
 def outlook(campaign: Campaign, url: str) -> Progress:
     """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
 
-    Only the first round is counted. Of adaptive axes, the values that are known to be needed are counted, or only the
-    first values if outputs have tolerances for their standard errors.
+    Only the first round of each stage is counted. For adaptive axes, all values are counted that are already known to
+    be needed. If outputs have tolerances for their standard errors, only the first values of these axes are counted.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -174,7 +174,8 @@ def _run_rounds(
 ) -> _Round | None:
     """Run the rounds of a stage. Each round adds realisations to the cases whose errors are still too large.
 
-    Return the last round, or None if another part has not finished a round and is not running.
+    Return the last round, or None if the run cannot go on because another part has not finished a round and is not
+    running.
     """
     replication = job.stage.campaign.replication
     while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
@@ -197,8 +198,8 @@ def _run_rounds(
 def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
     """Finish a study whose adaptive axes need no more values.
 
-    If fitted constants have tolerances, add realisations until they are met. Then mark the results that are still
-    missing as not needed.
+    If fitted constants have tolerances, add realisations until the tolerances are met or the limit is reached. Then
+    mark the results that are still missing as not needed.
     """
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
@@ -218,14 +219,14 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return the job without tolerances of fitted constants, for the stages that choose values of adaptive axes."""
+    """Return the job without the tolerances of fitted constants, for use while values of adaptive axes are chosen."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))
 
 
 def _next(job: _Job, last: _Round | None) -> _Round:
-    """Return the next round. If a case needs more realisations, first extend the store; meanwhile other parts wait."""
+    """Return the next round. If a case needs more realisations, extend the store; other parts wait meanwhile."""
     replication = job.stage.campaign.replication
     with store.gate(job.url):
         layout, places = stored_layout(job.stage, job.url)
@@ -257,7 +258,10 @@ def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Temp
 
 
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
-    """Return the factor by which the number of realisations of each case must grow; at most 1 if a case has enough."""
+    """Return the factor by which the number of realisations of each case must grow.
+
+    The factor is at most 1 for a case with enough realisations.
+    """
     own = [
         np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
         for mask, template in zip(last.needed, layout, strict=True)
@@ -297,7 +301,7 @@ def _require_seen(job: _Job, current: _Round) -> None:
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
-    """Wait until the other parts have finished a round; return False if one has not finished it and is not running."""
+    """Wait until the other parts have finished a round; return False if an unfinished part is not running."""
     what = f"the round of {current.realisations[1]} realisations needs results of parts"
     reported = time.monotonic()
     while True:

@@ -1,6 +1,6 @@
 """For campaigns with adaptive axes: find the cases of a stage in the store, and choose the values of the next stage.
 
-A stage depends only on the results of the previous one, so a repeated run finds the same stage again.
+A stage depends only on the results of the previous stage, so a repeated run finds the same stage again.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.refinement import Mean, Mesh, Stage, refined
 
-#: The positions in the store at which the values of a stage lie, for each group and each dimension.
+#: For each group and each dimension, the positions in the store of the values of a stage.
 Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout of the store with the new cases of a stage, and the positions of all cases of the stage."""
+    """Return the layout of the store with the new cases of a stage, and the positions in it of all its cases."""
     campaign = stage.campaign
     if not store.exists(url):
         layout = templates(campaign, campaign.replication.at_least)
@@ -36,7 +36,7 @@ def _all_of(template: Template) -> Mapping[str, IntArray]:
 
 
 def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Sequence[BoolArray]) -> list[BoolArray]:
-    """Convert masks of cases from the dimensions of the series to the dimensions of the store."""
+    """Convert masks of the cases of a stage to masks of the cases in the store, in the order of its dimensions."""
     found = []
     for mesh, template, place, wanted in zip(stage.meshes, layout, places, cases, strict=True):
         dims = template.dims[:-1]
@@ -50,9 +50,9 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, or None if no values are needed, and an event about the choice.
+    """Return the stage that follows a finished stage, and an event that reports the numbers of values.
 
-    Only the first `realisations` realisations of each case are used.
+    The stage is None if no further values are needed. Only the first `realisations` realisations of each case are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}
@@ -80,7 +80,7 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
 def _means(
     url: str, mesh: Mesh, template: Template, place: Mapping[str, IntArray], realisations: int
 ) -> dict[str, Mean]:
-    """Return the means over realisations of each output with a tolerance for interpolation."""
+    """Return the means over realisations of every output that has a tolerance for interpolation."""
     dims, own, name = template.dims[:-1], list(mesh.series.sizes), template.series.name
     cases = np.ix_(*(place[dim] for dim in dims), np.arange(realisations))
     order = [*(dims.index(dim) for dim in own), len(dims)]

@@ -1,4 +1,4 @@
-"""A window of tasks on a Dask cluster: just enough blocks are submitted at the same time to keep all workers busy."""
+"""A window of tasks on a Dask cluster: only as many blocks are submitted as keep all workers busy."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
 CHECK_PAUSE = 1.0
 #: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
-#: Time in s to wait for a short answer of the scheduler.
+#: Time in s to wait for an answer of the scheduler or for a result that a worker has finished.
 ANSWER_LIMIT = 3.0
 #: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
 
-#: Context in which a worker keeps its child process, and a lock. The threads of the worker use the child process one
-#: after the other; a thread holds the lock meanwhile.
+#: `_OPEN`: context that ends the child process of a worker together with the worker. `_APART`: lock that a thread of
+#: the worker holds while it uses the child process.
 _OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]
@@ -41,9 +41,10 @@ Outcomes = list[tuple[Work, Outcome]]
 class TaskWindow:
     """The blocks that are submitted to a cluster at the same time: a few more than the cluster can compute at once.
 
-    `patience`: seconds without any worker after which the run ends with an error. `most`: largest number of threads of
-    an adaptive cluster, otherwise 0. `replace_lost` requests new workers if Dask does not do this itself.
-    `last_message` returns the last error message of the cluster. `case_timeout`: seconds after which a case fails.
+    The run ends with an error after `patience` seconds without any worker, and a case fails after `case_timeout`
+    seconds. `most` is the largest number of threads of an adaptive cluster, and 0 for other clusters. `replace_lost`
+    requests new workers; it is None if the run need not do this. `last_message` returns the last error message of the
+    cluster.
     """
 
     def __init__(
@@ -88,7 +89,7 @@ class TaskWindow:
                     outcomes = _outcomes(future)
                 except Empty:
                     continue
-                except TimeoutError:  # the worker that had the result has disappeared
+                except TimeoutError:  # the worker with the result has disappeared: wait again
                     future.add_done_callback(self._ended.put)
                     continue
                 work = self._running.pop(future)
@@ -148,7 +149,7 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the result of a task, or None if its workers died; raise other errors with a message of one sentence."""
+    """Return the outcomes of a task, or None if its workers died; turn other known errors into a ClusterError."""
     from concurrent.futures import CancelledError
 
     try:
@@ -175,7 +176,7 @@ def _run_apart(work: Work, limit: float | None) -> Outcomes:
     try:
         with _APART:
             return list(compute_apart(_child(work.model), work, limit))
-    except (ImportError, ModelError):  # the child process cannot import the model
+    except (ImportError, ModelError):  # the child process cannot import the model: compute here
         return _run(work, limit)
 
 

@@ -41,7 +41,7 @@ class Place:
     url: str
     series: str
     index: BlockIndex
-    # Slices of the block along (axes..., realisation).
+    # The slice of the arrays that the block fills, along each axis and then along ``realisation``.
     region: tuple[slice, ...]
     # The `layout_mark` that the driver found in the store. A worker that finds a different mark writes nothing.
     layout: str
@@ -57,8 +57,9 @@ def write_block(
 ) -> None:
     """Write a block: first its record, then one whole chunk of every output, and finally its chunk of the ledger.
 
-    The record holds the digest of every chunk, so that the chunks of a killed task can be identified. `values` have the
-    shape of the region, then the further dimensions of the output; they are empty if only the ledger `status` changes.
+    The record holds the digest of every chunk, so that one can tell later which chunks a killed task has written. Each
+    array of `values` has the shape of the region, followed by the further dimensions of the output. `values` is empty
+    if only the ledger changes.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -118,11 +119,11 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return empty arrays in memory like the stored ones, and the dictionary in which their encoded chunks appear."""
+    """Return arrays in memory like the stored ones, and the dictionary that receives their encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory, empty = zarr.storage.MemoryStore(encoded), {}
     for name, array in shown.items():
-        # a larger array, so that all its chunks are whole
+        # round the shape up to whole chunks
         shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
         larger = array_of({**array.metadata.to_dict(), "shape": shape}, memory, array.path)
         empty[name] = larger.with_config({"write_empty_chunks": True})

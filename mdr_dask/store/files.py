@@ -24,11 +24,11 @@ from mdr_dask.errors import MdrDaskError, StoreError
 
 T = TypeVar("T")
 
-#: Name of the results at the root of a store that also has series.
+#: Name that the group at the root has if the store also has series.
 ROOT = "-"
 #: Folder with claims, which replace locks in a store on a server or on a file system without locks.
 CLAIMS = ".claims/"
-#: Folder with the record of the layout.
+#: Folder with the record of the layout (`mdr_dask.store.integrity`).
 RECORD_FOLDER = ".layout"
 #: Names of the files that a study may contain if its first run was stopped before the study was laid out.
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
@@ -36,7 +36,7 @@ KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
 AT_ONCE = 64
 #: Time in s after which a request to a server fails if there is no answer; no chunk takes that long.
 LONGEST_REQUEST = 120.0
-#: Number of threads that flush files to the disk and wait until this is done; a block has about ten files.
+#: Number of files that are flushed to the disk at the same time, each by a thread. A block has about ten files.
 FLUSHERS = 8
 #: Version of the layout; stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
@@ -70,7 +70,7 @@ class _RemoteStore(zarr.storage.FsspecStore):
 
 @lru_cache(maxsize=16)
 def bytes_of(url: str) -> Any:
-    """Return the Zarr store, a map from names to bytes, at a path or URL."""
+    """Return the Zarr store at a path or URL; it maps the names of files to their bytes."""
     path = local(url)
     if path is not None:
         return zarr.storage.LocalStore(path)
@@ -162,8 +162,8 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages: each file is replaced in one step, after all files of the earlier stages.
 
-    On a disk, all contents are first flushed under temporary names. The names of the earlier stages are flushed before
-    the last stage gets its names.
+    On a disk, all files are first written under temporary names and flushed. Then the files of the earlier stages get
+    their final names. Only when these names are flushed do the files of the last stage get theirs.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -217,7 +217,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its missing parents. Return the folders that may have new entries."""
+    """Make a folder and its missing parents. Return the folders in which a folder may have been made."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]
@@ -262,7 +262,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic: for local files, and for servers that create a file with a single request."""
+    """Return whether `create` is atomic; it is for local files, and on servers that create a file in one request."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -328,12 +328,12 @@ def _raise_unless_gone(error: OSError) -> None:
 
 
 def group_name(series: str, member: str = "") -> str:
-    """Return the path of the group of a series, or of an array in this group. Arrays without series are at the root."""
+    """Return the path of the group of a series, or of an array in it; without a series, the group is the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block; `further` counts the dimensions that the ledger does not have."""
+    """Return the name of the chunk of a block; `further` is the number of dimensions that the ledger lacks."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
@@ -352,7 +352,10 @@ def with_digest(document: Mapping[str, Any]) -> bytes:
 
 
 def without_digest(line: bytes) -> dict[str, Any] | None:
-    """Return a document without its digest, or None if it is damaged. A document without a digest is not checked."""
+    """Return a document without its digest, or None if it is damaged.
+
+    A document that has no digest is not checked.
+    """
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

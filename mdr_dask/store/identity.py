@@ -1,4 +1,4 @@
-"""Compare a campaign with the store that it resumes or extends, and append its new values to the stored values."""
+"""Compare a campaign with the store that it resumes or extends, and add new values of axes to the stored ones."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
 
 
 def _with_root(url: str, campaign: Campaign) -> Campaign:
-    """Return the campaign; a series that matches the results at the root of the store gets an empty name."""
+    """Return the campaign, with an empty name for the series that matches the results at the root of the store."""
     root = _group_attributes(url, "")
     if root is None or any(not series.name for series in campaign.series):
         return campaign
@@ -185,9 +185,9 @@ def _by_digest(value: Any) -> Any:
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Append the new entries of a series to the stored ones.
+    """Append the new values of a series to the stored values.
 
-    Also return, for each dimension, the position of each entry of the given series in the extended series.
+    Also return, for each dimension, the positions of the values of the given series in the extended series.
     """
     places = {}
     axes = []
@@ -205,9 +205,10 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of each entry of a dimension, by its values as text and the number of earlier equal entries.
+    """Return the position of each entry of a dimension; an entry has one value of every axis of the dimension.
 
-    Values that agree to `SAME_DIGITS` digits count as equal. Two cases may be equal if whole numbers are sampled.
+    The key of an entry is the text of its values, and the number of equal entries before it. Values that agree to
+    `SAME_DIGITS` digits count as equal. Entries may be equal if whole numbers are sampled.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()

@@ -46,12 +46,12 @@ def read_record(url: str) -> LayoutRecord | None:
 
 
 def is_inside(name: str) -> bool:
-    """Return whether a name from a store of unknown source is the name of a file inside this store."""
+    """Return whether a name that a store contains is the name of a file inside this store."""
     return not name.startswith("/") and ".." not in name.split("/")
 
 
 def is_safe(group: Mapping[str, Any]) -> bool:
-    """Return whether Zarr can open a group of an unknown source: format 3, known codecs, names inside the store."""
+    """Return whether it is safe to open a group with Zarr: format 3, known codecs, names inside the store."""
     try:
         members = group["consolidated_metadata"]["metadata"]
         return group["zarr_format"] == 3 and all(is_inside(name) and _is_safe(members[name]) for name in members)

@@ -1,4 +1,4 @@
-"""Lay out a study: create or extend its arrays from templates. One write then makes the new shape visible."""
+"""Lay out a study: create or extend its arrays from templates. The last write makes the new shape visible."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from mdr_dask.store.integrity import RECORD, LayoutRecord, read_record
 from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
-#: Number of values in a chunk of a coordinate: a single chunk for nearly every axis.
+#: Number of values in a chunk of a coordinate, so large that nearly every axis has a single chunk.
 _COORDINATE_CHUNK = 4096
 #: Names of the attributes that `_series_attributes` returns. If series are added to a store without series, these
 #: attributes stay at the root.
@@ -130,7 +130,7 @@ def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return the names that belong to chunks of coordinates, according to the metadata of the study."""
+    """Return those of the given names that are chunks of coordinates, according to the metadata of the study."""
     members = root["consolidated_metadata"]["metadata"]
     groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
     data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
@@ -166,7 +166,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a hint how to open a study with series, which would look empty when opened as one dataset."""
+    """Return a comment for a study with series that says how to open it; opened as one dataset, it looks empty."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
@@ -308,7 +308,7 @@ def _series_attributes(template: Template) -> dict[str, Any]:
 
 
 def plain_values(values: tuple[Any, ...]) -> list[Any]:
-    """Return axis values in a form that JSON can hold."""
+    """Return the values of an axis as values that JSON can represent."""
     return [_plain(value) for value in values]
 
 

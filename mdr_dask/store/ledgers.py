@@ -33,7 +33,7 @@ class Blocks:
     # Number of blocks along each dimension, and length of a block.
     grid: tuple[int, ...]
     lengths: tuple[int, ...]
-    # For each array, the number of dimensions that the ledger does not have. The first array is the ledger itself.
+    # For each array, the number of its dimensions that the ledger lacks. The first array is the ledger itself.
     further: Mapping[str, int]
 
     @classmethod
@@ -61,9 +61,9 @@ class Blocks:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
-    """Return the current ``status`` array of a group, padded with "missing" or cut to `shape` if it is given.
+    """Return the current ``status`` array of a group, cut or padded with "missing" to `shape` if that is given.
 
-    The stored array is larger than the shape if the run of another part has extended it.
+    The stored array is larger than `shape` if the run of another part has extended it.
     """
     metadata = document(url, series)
     if metadata is None:
@@ -107,8 +107,8 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    Only the layout and the ledger are read, not the values. With `to_run`, missing files of the layout are no fault,
-    because the run writes these files again.
+    Only the layout and the ledger are read, not the values. If `to_run` is true, missing files of the layout are no
+    fault, because the run writes these files again.
     """
     faults = _faults(url, series, to_run)
     if any(faults):  # check again, because a run may have changed a file during the first check

@@ -1,6 +1,6 @@
-"""Locks: a store has one exclusive run, or several parts of a campaign at the same time.
+"""Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
-Where the file system has locks, the operating system releases them when a process ends. Elsewhere, and at URLs, a run
+If the file system has locks, the operating system releases them when a process ends. Elsewhere, and at URLs, a run
 makes a claim: a file that only one process can create, and a second file that its owner regularly writes as a sign of
 life. A run holds another lock, the gate, while it checks which runs are active and while it lays out the study.
 """
@@ -41,7 +41,7 @@ from mdr_dask.store.files import (
 
 try:
     import fcntl
-except ImportError:  # this system has no such locks: runs make claims instead
+except ImportError:  # without this module, runs make claims instead of locks
     fcntl = None  # type: ignore[assignment]
 
 #: `BEAT`: time in s between two signs of life of a run with a claim. `SILENCE`: time in s without a sign of life after
@@ -49,7 +49,7 @@ except ImportError:  # this system has no such locks: runs make claims instead
 BEAT = 10.0
 SILENCE = 60.0
 #: Time in s for which a process tries to acquire a lock that another process holds. The other process may hold the lock
-#: only for an instant, to check whether it is free.
+#: only for an instant, to check whether the lock is free.
 GLANCE = 0.5
 #: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
 #: message is logged, so that a user reads it within five seconds.
@@ -66,7 +66,7 @@ log = logging.getLogger("mdr_dask.store")
 
 @dataclass(frozen=True)
 class Lock:
-    """A lock that a run holds. The tasks of the run need it to write."""
+    """A lock that a run holds. The tasks of the run write only while the run holds the lock."""
 
     # Name of the lock; the exclusive lock has an empty name.
     name: str
@@ -74,8 +74,8 @@ class Lock:
     owner: str
     # Number of the claim; None if the lock is one of the operating system.
     claim: int | None = None
-    # Whether the process of an earlier run crashed or was killed while it held this lock. For the exclusive lock,
-    # earlier runs of parts count too.
+    # Whether the process of an earlier run crashed or was killed while it held this lock. For the exclusive lock, this
+    # also includes the locks of parts.
     after_crash: bool = False
 
 
@@ -83,7 +83,7 @@ class Lock:
 class Part:
     """One of several disjoint sets of blocks; a separate process computes each set."""
 
-    # Counted from 1.
+    # Number of this part, from 1, and number of all parts.
     number: int
     count: int
 
@@ -99,8 +99,8 @@ class Part:
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, from the position of the block among all blocks.
 
-        With n parts, every further n blocks begin with the next part. Otherwise, if an axis had n blocks, all blocks at
-        one position on the axis would belong to the same part.
+        With 3 parts, the blocks belong in turn to the parts 1, 2, 3, then 2, 3, 1, then 3, 1, 2, and so on. If they
+        always belonged to 1, 2, 3, all blocks at one position on an axis of 3 blocks would belong to the same part.
         """
         return cls((position + position // count) % count + 1, count)
 
@@ -109,7 +109,7 @@ class Part:
 def exclusive(url: str) -> Iterator[Lock]:
     """Lock a study for one run; raise StoreBusyError if another run or a part is active.
 
-    In a read-only store the lock allows only reading.
+    If the store is read-only, the run can only read.
     """
     with ExitStack() as held:
         with gate(url):
@@ -130,7 +130,7 @@ def exclusive(url: str) -> Iterator[Lock]:
 def shared(url: str, part: Part) -> Iterator[Lock]:
     """Lock one part of a study; the other parts may run at the same time.
 
-    Raise StoreBusyError if this part, the whole study, or a part of another number of parts is running.
+    Raise StoreBusyError if this part, the whole study, or a part of a division into another number of parts is running.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -162,7 +162,10 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return the process that runs the whole study, or None, and the active parts. Nothing is written."""
+    """Name the process that runs the whole study (None if there is none), and return the active parts.
+
+    Nothing is written.
+    """
     return (_holder(url) if _is_held(url) else None), _parts(url)
 
 
@@ -177,7 +180,7 @@ def active_runs(url: str) -> list[str]:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Return ascending numbers as ranges: ``1-3, 7``."""
+    """Return ascending numbers as a text with ranges: ``1-3, 7`` for 1, 2, 3 and 7."""
     runs = itertools.groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0])
     ends = [[number for _, number in run] for _, run in runs]
     return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in ends)
@@ -185,9 +188,10 @@ def _ranges(numbers: list[int]) -> str:
 
 @contextmanager
 def acquire(url: str, name: str = "") -> Iterator[Lock]:
-    """Hold the lock with a name (empty: the exclusive lock); raise StoreBusyError if another process holds it.
+    """Hold the lock with the given name until the context ends; raise StoreBusyError if another process holds it.
 
-    In a read-only store the lock allows only reading.
+    An empty name stands for the exclusive lock. If the store is read-only, the lock has no owner and allows only
+    reading.
     """
     if local(url) is None:
         with _claimed(url, name) as lock:
@@ -215,8 +219,8 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
     """Check that a run still holds its lock; raise StoreBusyError if not, and StoreError if the store can only be read.
 
-    With a lock of the operating system, no other run can take over the lock until this context ends. A claim is only
-    checked at the beginning.
+    With a lock of the operating system, no other run can take over the lock until this context ends. A claim is checked
+    only when the context begins.
     """
     if not lock.owner:
         raise StoreError(f"{url}: the study is not finished, and nothing can be written here (permission denied)")
@@ -244,7 +248,7 @@ def _lock_file(url: str, name: str = "") -> Path:
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # for example, a link to itself, or a null character
+    except (OSError, RuntimeError, ValueError) as error:  # for example, for a link to itself, or a null character
         raise StoreError(f"{url}: expected a path: {error}") from None
     return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
 
@@ -323,7 +327,7 @@ def _busy(url: str, who: str) -> StoreBusyError:
 
 
 def _holder(url: str, name: str = "") -> str:
-    """Return a text for messages that names the process that holds a lock."""
+    """Return a text that names the process that holds a lock, for use in messages."""
     names = [_read_claim(url, _claim(name, number)).get("who") for number in sorted(_numbers(url, name), reverse=True)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
@@ -361,7 +365,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Remove the runner files of a lock when no task of their runs is writing."""
+    """Remove the runner files of a lock, each when no task of its run is writing any more."""
     give_up = time.monotonic() + SILENCE
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
@@ -395,14 +399,14 @@ def _numbers(url: str, name: str) -> list[int]:
 
 @contextmanager
 def _claimed(url: str, name: str) -> Iterator[Lock]:
-    """Hold a claim, and write signs of life until the end."""
+    """Hold a claim, and write signs of life until the context ends."""
     owner = uuid.uuid4().hex
     number = _make_claim(url, name, owner)
     ended = threading.Event()
 
     def live() -> None:
         while not ended.wait(BEAT):
-            # go on after an error, because the network may come back; blocks are written only while the claim is valid
+            # go on after an error, because the network may come back; blocks are written only while the claim exists
             with suppress(StoreError):
                 write_bytes(url, _life(name, number), json.dumps({"time": time.time()}).encode())
 
@@ -419,14 +423,14 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
 
 def _make_claim(url: str, name: str, owner: str) -> int:
-    """Make the next claim and return its number; raise StoreBusyError if the owner of the last claim is active."""
+    """Make a claim and return its number; raise StoreBusyError if the owner of the last claim is still active."""
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
         raise _busy(url, _holder(url, name))
     number = max(standing, default=0) + 1
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
-        # if only the reply to the request was lost, the claim belongs to this run
+        # if only the reply of the server was lost, the claim is that of this run
         if _read_claim(url, _claim(name, number)).get("owner") != owner:
             raise _busy(url, _holder(url, name))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
@@ -444,7 +448,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
     if time.time() - last.get("time", 0.0) <= SILENCE:
         return True
     if not claim and read_bytes(url, _claim(name, number)) is None:
-        return True  # its owner has just ended, and another run may have started
+        return True  # the owner has just ended, and another run may have started
     log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
     time.sleep(2 * BEAT)
     return (_read_claim(url, _life(name, number)) or claim) != last

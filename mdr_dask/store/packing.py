@@ -14,13 +14,14 @@ from mdr_dask.store.files import listed, read_many
 from mdr_dask.store.layout import Finding
 from mdr_dask.store.verification import CHECKSUMS, Inspection, of_store, verify
 
-#: Largest accepted ratio of the size of a file to its size in the zip, for files of more than `SMALL` bytes: a larger
-#: ratio may fill the disk. Chunks are compressed already, so their ratio is about 1, and that of metadata is about 10.
+#: Largest accepted ratio of the size of a file to its size in the zip, for files of more than `SMALL` bytes: a file
+#: with a larger ratio might fill the disk when it is unpacked. Chunks are compressed already, so their ratio is about
+#: 1, and that of metadata is about 10.
 LARGEST_RATIO, SMALL = 100, 2**20
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and the content of every file of a store, except files that belong only to a publication."""
+    """Yield the name and the content of every file of the study itself, without those that a publication adds."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content
@@ -34,7 +35,7 @@ def verify_packed(path: Path) -> Inspection:
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
             expected = _checksums(path, packed)
-            packed.extractall(folder)  # keeps every file inside the folder, whatever its name
+            packed.extractall(folder)  # writes only into the folder, whatever the names
             findings = list(_compare(folder, expected))
             try:
                 inspected = verify(folder)

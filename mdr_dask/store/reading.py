@@ -38,7 +38,7 @@ def readable(url: str) -> Iterator[None]:
 
 
 def is_damage(error: Exception) -> bool:
-    """Return whether an error comes from Zarr or its codecs, which means that a chunk cannot be read."""
+    """Return whether an error comes from Zarr or its codecs; such an error means that a chunk cannot be read."""
     *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
     package = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
     return not isinstance(error, OSError) and package in ("zarr", "numcodecs")
@@ -79,12 +79,15 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``, lazy arrays piece by piece. Lists in attrs become texts."""
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
+
+    Lazy arrays are written piece by piece. Attributes that are neither texts nor numbers are written as JSON texts.
+    """
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # without this attribute, no run can extend the copy
+        if value is not None and name != "mdr_dask_layout"  # left out, so that no run can extend the copy
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:

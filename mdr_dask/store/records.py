@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-A run writes one file for each block, and merges them from time to time, because a folder with a hundred thousand files
-would be slow.
+A run writes one file for each block. From time to time it merges many of these files into one, because a folder with a
+hundred thousand files would be slow.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ _LOOSE = re.compile(r"(\d+(?:\.\d+)*)-(\d+)\.json")
 
 
 def folder(series: str) -> str:
-    """Return the prefix of all records of a group."""
+    """Return the prefix of the file names of all records of a group."""
     return group_name(series, "status/records/")
 
 
 def name_of(series: str, index: BlockIndex, attempt: int) -> str:
-    """Return the name of the record of an attempt at a block."""
+    """Return the file name of the record that an attempt to compute a block writes."""
     return f"{folder(series)}{'.'.join(map(str, index))}-{attempt}.json"
 
 
@@ -88,7 +88,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Log a warning of damaged records, once for each number of them."""
+    """Log a warning of damaged records; it is repeated only if their number changes."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 
@@ -108,9 +108,10 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 
 
 def merge_records(url: str, series: str) -> None:
-    """Merge the records of single blocks that are in the ledger into files that hold many records each.
+    """Merge record files of single blocks into files with many records, if the blocks are in the ledger.
 
-    If a process is killed while merging, or two processes merge, a record is in two files. Readers use it only once.
+    If a process is killed while it merges files, or two processes merge files, a record can be in two files. Readers
+    use it only once.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

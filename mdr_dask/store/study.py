@@ -45,20 +45,20 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
-    """Return the metadata of a study, or None if they have no digest in the record of the layout or are not safe."""
+    """Return the metadata of a study; None if they are not safe or the record of the layout lacks their digest."""
     root = parsed(content)
     if not isinstance(root, dict) or not isinstance(attributes := root.get("attributes", {}), dict):
         return None
     layout = attributes.get("mdr_dask_layout", LAYOUT + 1)
     if only_claimed(attributes) or (isinstance(layout, int) and layout > LAYOUT):
-        return root  # no study or one of a later version, which `attributes` refuses
+        return root  # `attributes` raises an error for these metadata
     record = read_record(url)
     is_known = record is None or digest(content) in record.files["zarr.json"]
     return root if is_known and is_safe(root) else None
 
 
 def group_of(root: Mapping[str, Any], group: str) -> Mapping[str, Any] | None:
-    """Return the metadata of a group from those of its study, or None if there is no such group."""
+    """Return the metadata of a group from the metadata of its study, or None if there is no such group."""
     if not group:
         return root
     members = root.get("consolidated_metadata", {}).get("metadata", {})
@@ -119,7 +119,7 @@ def only_claimed(found: Mapping[str, Any]) -> bool:
 def attributes(url: str) -> dict[str, Any]:
     """Return the attributes of a study.
 
-    Raise StoreError if there is no study of mdr_dask, or one with a layout of a later version.
+    Raise StoreError if there is no study of mdr_dask, or if its layout has a later version.
     """
     refuse_file(url)
     found = _root_attributes(url)

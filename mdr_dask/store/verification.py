@@ -40,9 +40,9 @@ class Group:
     """A group of a store during verification: its blocks, and the faults that `repair` removes."""
 
     blocks: Blocks
-    # For each block and attempt, the digests of the chunks that were written, by the name of the array.
+    # For each block and each attempt to compute it, the digest of the chunk of each array that was written.
     attempts: dict[BlockIndex, dict[int, Mapping[str, str]]] = field(default_factory=dict)
-    # Blocks that must be in the ledger.
+    # Blocks whose records are merged. A record is merged only if its block is in the ledger.
     finished: set[BlockIndex] = field(default_factory=set)
     bad_blocks: set[BlockIndex] = field(default_factory=set)
     bad_records: set[str] = field(default_factory=set)
@@ -54,7 +54,7 @@ class Inspection:
     """What was found in a store."""
 
     findings: list[Finding] = field(default_factory=list)
-    # Messages about facts that are no damage, for example that a run was interrupted.
+    # Messages about things that are not damage, for example that a run was interrupted.
     notes: list[str] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
     # Number of files in the store, and number of blocks that are in the ledgers.
@@ -100,7 +100,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names of files of the study itself, without the files of an active run or of a publication."""
+    """Yield those of the names that belong to the study itself, and not to an active run or a publication."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)):
             yield name
@@ -150,7 +150,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
 
 
 def _check_records(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Find records that are damaged or foreign, and keep the others; return the names of all record files."""
+    """Find damaged and foreign records, note the digests of the others, and return the names of all record files."""
     series, known = group.blocks.series, set[str]()
     for name, line in lines(url, series):
         known.add(name)
@@ -177,7 +177,7 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
 
 
 def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Compare the chunks of every block with the digests in its records; return the names of all chunks."""
+    """Compare the chunks of every block with the digests in its records; return the file names of all chunks."""
     blocks, known = group.blocks, set[str]()
     begun = 0
     for block in blocks.indices:
@@ -236,7 +236,7 @@ def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> s
 
 
 def _remove_records(url: str, group: Group) -> None:
-    """Remove files with damaged records or records of damaged blocks; copy their other records to a new file."""
+    """Remove files with damaged records or records of damaged blocks; first copy the good records to a new file."""
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
     bad |= {name for name, _, record in found if record is None or tuple(record["block"]) in group.bad_blocks}
