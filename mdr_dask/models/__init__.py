@@ -38,7 +38,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(name: str) -> Model[Any]:
-    """Return the model called `name`: one of `names`, or ``package.module:NAME``. Otherwise raise ModelError."""
+    """Return the model `name`: one of `names`, or ``package.module:NAME``. Raise ModelError if there is none."""
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
         return model
@@ -56,9 +56,9 @@ def is_own(name: str) -> bool:
 
 
 def source_digest(name: str) -> str | None:
-    """Return a digest of the source file of a user's model, without its blank lines and comments.
+    """Return a digest of the source file of a user's model; blank lines and comments do not count.
 
-    Return None for the models of this package, and if the source file cannot be read.
+    Return None for a model of this package, or if the source file cannot be read.
     """
     if not is_own(name):
         return None
@@ -77,7 +77,7 @@ def _installed() -> dict[str, EntryPoint]:
 
 
 def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
-    """Import a model from outside this package; any error becomes a ModelError."""
+    """Import a model from outside this package. Every error of the import becomes a ModelError."""
     try:
         found = entry.load()
     except ModuleNotFoundError as error:
@@ -97,7 +97,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function of a user's model that raises ModelError instead of any other exception."""
+    """Return a function of a user's model, changed so that it raises ModelError instead of any other exception."""
 
     def call(argument: Any) -> Any:
         try:

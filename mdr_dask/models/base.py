@@ -37,7 +37,7 @@ def unquoted(value: Any) -> Any:
     return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
 
 
-#: A whole number, which may be in quotes, because numbers with a unit are written in quotes, too.
+#: A whole number. It may be written in quotes, because numbers with a unit are also written in quotes.
 Whole = Annotated[int, BeforeValidator(unquoted)]
 
 
@@ -47,12 +47,12 @@ class Parameters(BaseModel):
     A parameter set cannot be changed, and unknown keys are errors. A subclass may declare:
 
     * `renamed`: earlier names of parameters and outputs, each with a text that says what to write now.
-    * `alternatives`: groups of alternatives; a user gives exactly one member of each group. A member is a tuple of
-    parameters that are given together. In the path of a nested parameter, a dot separates the names.
-    * `overrides`: parameters that replace another parameter, each with the name of that other parameter.
+    * `alternatives`: groups of alternatives; a user gives exactly one of each group. Example of a group:
+    ``(("length", "rms_roughness"), ("profile",))``, if a user gives either `length` together with `rms_roughness`, or
+    `profile`. A nested parameter is written with dots, such as ``"indenter.radius"``.
+    * `overrides`: for example ``{"history": "cycles"}``, if `cycles` has no effect when `history` is given.
     * `settings`: parameters of the numerical solution that do not change the physical problem, such as a resolution.
-    * `requires`: parameters that have an effect only if another parameter has a certain value, each with the name and
-    the value of that other parameter.
+    * `requires`: for example ``{"xi": ("wear_rule", "fast")}``, if `xi` has an effect only with ``wear_rule: fast``.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -71,7 +71,7 @@ class Parameters(BaseModel):
 
     @property
     def inactive(self) -> dict[str, str]:
-        """The parameters that have no effect, each with the parameter that overrides it."""
+        """The parameters that have no effect, each with the name of the parameter that overrides it."""
         return {other: name for name, other in self.overrides.items() if getattr(self, name) not in (None, ())}
 
 
@@ -84,15 +84,15 @@ def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
-#: Smallest and largest size of a quantity other than 0, in SI units: products of ten such numbers neither overflow nor
-#: underflow.
+#: Smallest and largest absolute value of a quantity that is not 0, in SI units. Products of ten such numbers neither
+#: overflow nor underflow.
 LEAST, MOST = 1e-30, 1e30
 
 
 def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any:
     """Declare a physical parameter, as in ``length: float = quantity("m", "length of the line", gt=0)``.
 
-    `unit` is the coherent SI unit, ``"1"`` for a pure number. `usual` is a common value with its unit, such as ``"10
+    `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as ``"10
     MPa"``, for ``mdr-dask init``. If a number without a unit differs from `usual` by more than three decades, ``check``
     asks the user about it. Further values after commas, as in ``"2 GPa, 200 HV"``, show other units in which people
     write the quantity. The other arguments, such as ``default``, ``gt`` and ``le``, are those of
@@ -100,7 +100,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert a text such as ``20 mm`` to SI by the converter in the context; keep names such as ``auto``."""
+        """Convert a text such as ``20 mm`` to SI units by the converter in the context; keep names such as ``auto``."""
         if isinstance(value, list | tuple):
             return tuple(to_si(item, info) for item in value)
         value = unquoted(value)
@@ -115,7 +115,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
 
 
 def _conceivable(least: float, value: Any) -> Any:
-    """Raise ValueError for numbers so large or small that their products overflow or underflow."""
+    """Raise ValueError for a number so large or so small that products of such numbers overflow or underflow."""
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
             got, low, high = distinguishable(number, least, MOST, digits=6)
@@ -153,7 +153,7 @@ def canonical(number: ArrayLike) -> Any:
 
 
 def deferred(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that imports another function at its first call, so that declarations are quick to import."""
+    """Return a function that imports `name` from `module` only when it is called, so that declarations load quickly."""
 
     def call(*arguments: Any) -> Any:
         return getattr(import_module(module), name)(*arguments)
@@ -175,11 +175,12 @@ class Output:
     * `has_error`: whether the solver estimates the discretisation error. The error is stored as the companion `error`,
     unless the campaign has ``errors: false``.
     * `comment`: a limitation of the output, stored as its attribute ``comment``.
-    * `scatter`: name of another output, the standard error of this output in a single realisation. It is stored with
-    the errors.
-    * `floor`: for an output that can be zero, a value in its unit. The relative error of a smaller output is the error
-    divided by `floor`.
-    * `allow_nan`: whether NaN and infinite values are valid. Otherwise they are failures of a user's own model.
+    * `scatter`: name of the output that contains the standard error of this output in a single realisation. If errors
+    are stored, that output is stored, too.
+    * `floor`: a value in the unit of the output, for an output that can be zero. If the absolute value of the output is
+    below `floor`, its relative error is the error divided by `floor`.
+    * `allow_nan`: whether NaN and infinite values are valid. If they are not, a case in which a user's own model
+    returns such a value fails.
     """
 
     name: str
@@ -202,10 +203,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Number:
-    """A dimensionless number of each case of a model, for tables and conditions.
+    """A dimensionless number that is computed for each case, for tables and conditions.
 
-    `formula` is a formula for `mdr_dask.questions.expression`. It may contain outputs, other numbers and parameters;
-    the name of a nested parameter is its path, joined by ``_``.
+    The module `mdr_dask.questions.expression` evaluates `formula`. The formula may contain outputs, other numbers and
+    parameters. A nested parameter has its path as name, joined by ``_``, such as ``indenter_angle``.
     """
 
     name: str
@@ -224,15 +225,17 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Block(Generic[P]):
-    """A rectangle of cases and realisations: one Dask task, one chunk of every array, and one atomic write.
+    """Some cases, in the same realisations. One Dask task computes them and writes one chunk of every array.
 
-    * `parameters`: the fixed parameters. Its values of varied parameters are those of an arbitrary case; `column` gives
-    the values of all cases.
+    * `parameters`: a parameter set with the values of the fixed parameters. A varied parameter has in it
+    the value of an arbitrary case; `column` returns the values for all cases.
     * `columns`: the varied parameters by dotted path (such as ``velocity`` or ``indenter.angle``), one value for each
     case in SI units.
-    * `realisations`: indices of the realisations. An index and `seed` determine every random number of a realisation.
+    * `realisations`: indices of the realisations. An index and `seed` determine all random numbers of a
+    realisation.
     * `outputs`: names of the arrays to compute, including the companions that hold errors.
-    * `accuracy`: largest allowed relative discretisation error of every output with a companion (see `Output.floor`).
+    * `accuracy`: largest allowed relative discretisation error of every output that has a companion. `Output.floor`
+    defines the relative error of small values.
     """
 
     parameters: P
@@ -274,7 +277,7 @@ class Block(Generic[P]):
 
 
 def with_value(parameters: Any, path: str, value: Any) -> Any:
-    """Return a parameter set with another value at a dotted path."""
+    """Return a copy of a parameter set in which the parameter at a dotted path has the value `value`."""
     name, _, rest = path.partition(".")
     if rest:
         value = with_value(getattr(parameters, name), rest, value)
@@ -287,8 +290,8 @@ class Result:
 
     * `values`: the requested arrays, shape (cases, realisations, ...); NaN where a case failed.
     * `status`: values of `Status`, shape (cases, realisations).
-    * `messages`: reasons for failures, and warnings for other results, by index of the case and position of the
-    realisation in the block.
+    * `messages`: reasons for failures, and warnings about other results. The key is (index of the case, position of the
+    realisation in the block).
     * `solves`: number of solutions computed; several cases may share one solution.
     """
 
@@ -307,22 +310,24 @@ class Result:
 class Model(Generic[P]):
     """A computation that a campaign can name.
 
-    * `version`: raised when a change of the code changes results. Only this version can extend a store.
+    * `version`: a number that is raised when a change of the code changes results. A store can be extended only by the
+    version that created it.
     * `summary`: one line for ``mdr-dask models``.
     * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
     * `compute`: a pure function. The value of a case depends on its parameters, the seed and its realisation, but not
     on the other cases of the block. The function raises no exception for a case that fails.
     * `operations`: approximate number of floating-point operations of a block, from which block sizes are chosen. The
-    function must be fast. Without it, a study with n results is divided into about sqrt(n) blocks.
+    function must be fast. If it is None, a study with n results is divided into about sqrt(n) blocks.
     * `whole`: parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
-    becomes too large, the axis of the last parameter is divided first.
-    * `coordinates`: coordinates of the dimensions of outputs other than case and realisation.
+    becomes too large, the axis of the last of these parameters is divided first.
+    * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
     * `distinct`: number of different solutions among the cases of a block, for ``check``; by default the number of
     cases.
-    * `units`: units that differ from the declared ones, by output or parameter, as in a dimensionless campaign.
+    * `units`: units that differ from the declared ones, by the name of the output or parameter. A dimensionless
+    campaign has such units.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
-    * `notes`: notes for ``check`` about a study. The argument contains parameter sets of the study, in which one axis
-    at a time is varied. Notes about a nested parameter set come from the method `notes` of that set.
+    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets of the study, in
+    which one axis at a time is varied. A nested parameter set can have its own method `notes`.
     """
 
     name: str
@@ -342,15 +347,15 @@ class Model(Generic[P]):
 
     @property
     def companions(self) -> dict[str, Output]:
-        """The companions, which hold the errors, by the names of their outputs."""
+        """The companions that hold the errors. The key is the name of the output, not of the companion."""
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
-        """Return the output or companion of this name; raise KeyError if there is none."""
+        """Return the output or the companion that is called `name`; raise KeyError if there is none."""
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names of outputs, each followed by its companion, and the names of their standard errors."""
+        """Return `names` and the names of their `scatter` outputs, each followed by its companion if it has one."""
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}
         kept = [output.name for output in self.outputs if output.name in asked]

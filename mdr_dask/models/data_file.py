@@ -15,12 +15,12 @@ from mdr_dask.errors import DataError, similar
 from mdr_dask.models.base import Parameters
 from mdr_dask.tables import decoded, described
 
-#: Size limit in bytes. Larger files get no note about their columns.
+#: Size limit in bytes: `DataFile.notes` describes the columns of smaller files only.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file that is named in a campaign, with the digest of its content when the campaign was read."""
+    """A file that is named in a campaign, with the digest that its content had when the campaign was read."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     name: str
@@ -29,7 +29,7 @@ class DataFile(BaseModel):
 
     @classmethod
     def of(cls, path: Path) -> DataFile:
-        """Return the file at a path, with the digest of its present content."""
+        """Return the file at a path, with the digest of its current content."""
         return cls(name=path.name, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
     def read_bytes(self) -> bytes:
@@ -45,7 +45,7 @@ class DataFile(BaseModel):
 
     @contextmanager
     def in_errors(self) -> Iterator[None]:
-        """In a ``with`` statement, put the name of the file before the message of any DataError."""
+        """Put the name of the file before the message of any DataError that a ``with`` statement raises."""
         try:
             yield
         except DataError as problem:
@@ -57,7 +57,7 @@ class DataFile(BaseModel):
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """Call `check` if a campaign is being read, and raise ValueError, as pydantic expects, in place of DataError."""
+    """Call `check` if a campaign is being read. Convert a DataError to the ValueError that pydantic expects."""
     if info.context is not None:
         try:
             check()
@@ -80,19 +80,19 @@ def _find_file(value: Any, info: ValidationInfo) -> Any:
     path = Path(directory, value).resolve()
     if not path.is_file():
         near = similar(path.name, [each.name for each in Path(directory).iterdir() if each.is_file()])
-        near = near or " (names begin at the folder of the campaign file)"
+        near = near or " (the path is relative to the folder of the campaign file)"
         raise ValueError(f"no such file: {path}{near}")
     return DataFile.of(path).model_copy(update={"name": value})
 
 
-#: A parameter that names a file, relative to the campaign file.
+#: A parameter that is the path of a file, relative to the folder of the campaign file.
 NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_type=str)]
 
 
 class NamedByFile(Parameters):
     """A parameter set with a field `file` or `files`.
 
-    If a user writes the name of a file alone, the other fields have their default values.
+    A user may write only the name of the file instead of the set. The other fields then have their default values.
     """
 
     model_config = ConfigDict(json_schema_extra={"bare_name": True})

@@ -1,4 +1,4 @@
-"""List the parameters of a case that are numbers, under the names that they have in a store."""
+"""List those parameters of a case that are numbers, under the names that they have in a store."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of each parameter that is a number and that no other parameter overrides.
+    """Return the value, unit and meaning of each parameter that is a number, unless another parameter overrides it.
 
     The name of a nested parameter is its path, joined by ``_``, such as ``indenter_angle``.
     """

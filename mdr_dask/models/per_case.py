@@ -22,7 +22,7 @@ from mdr_dask.models.base import Block, Result, Status
 #: the alarm signal.
 time_limit: float | None = None
 
-#: Folder of this package.
+#: Folder of the package mdr_dask.
 PACKAGE = f"{Path(__file__).parents[1]}{os.sep}"
 
 Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
@@ -32,11 +32,12 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     """Return a function for ``Model(compute=...)`` that solves the cases of a block one after another.
 
     `solve` receives the parameters of one case in SI units and a random generator. All cases of a realisation get the
-    same random numbers. `solve` returns a value for each output, by name. If an output has an error, `solve` returns it
-    as ``<output>_error``.
+    same random numbers. `solve` returns a value for each output, by name. If an output has an error, `solve` also
+    returns this error, as ``<output>_error``.
 
     A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
-    real, has another shape than declared, or is not finite without ``allow_nan=True``, and if an error is negative.
+    real, does not have the declared shape, or is not finite although ``allow_nan`` is False. Negative errors are also
+    failures.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -67,7 +68,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
 
 
 def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
-    """Solve a case; if there is a time limit, an alarm interrupts the solution."""
+    """Solve a case. If it takes longer than the time limit, an alarm interrupts the solution."""
     if time_limit is None:
         return solve(parameters, random)
     signal.setitimer(signal.ITIMER_REAL, time_limit)
@@ -95,8 +96,8 @@ def reason(error: BaseException) -> str:
 def where(error: BaseException) -> str:
     """Return where the user's function failed, such as `` (model.py:12)``.
 
-    If another package raised the exception, this is the line of the user's file that called it. The text is empty if
-    this package raised the exception, for example because of an invalid output.
+    If another package raised the exception, the text names the line of the user's file that called this package. The
+    text is empty if mdr_dask raised the exception, for example because of an invalid output.
     """
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     others = [(file, line) for file, line in frames if not file.startswith(PACKAGE)]
@@ -123,7 +124,7 @@ def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
         return np.asarray(value)
     try:
         array = None if hasattr(value, "units") or np.ma.is_masked(value) else np.asarray(value)
-    except Exception:  # a list of lists of different lengths
+    except Exception:  # such as a list of lists of different lengths
         array = None
     if array is not None and array.dtype.kind == "O" and all(_is_real(item) for item in array.flat):
         array = array.astype(np.float64)

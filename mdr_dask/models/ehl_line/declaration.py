@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `ehl_line`; quick to import."""
+"""Parameters and outputs of the model `ehl_line`. This module does not import the solver, so it loads quickly."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number,
 
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Relative error of the film thickness that is allowed if the campaign states no accuracy.
+#: Largest allowed relative error of the film thickness if the campaign states no accuracy.
 ACCURACY = 1e-3
 
-#: Each row contains a dimensionless number, the quantity with a unit that can replace the number, and the further
-#: parameters that are needed to compute the number from this quantity.
+#: Each row contains a dimensionless number, the dimensional quantity that a user can give instead, and the other
+#: parameters that are then also required. For example, `line_load` with `radius` replaces `load_parameter`.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -29,7 +29,8 @@ _PAIRS = (
 class EhlLineParameters(Parameters):
     """A lubricated line contact.
 
-    Load, speed and material are each given by a dimensionless number (W, U, G) or by a quantity with a unit.
+    A user gives the load, the speed and the material each as a dimensionless number (W, U or G) or as a quantity with
+    a unit.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -89,13 +90,14 @@ class EhlLineParameters(Parameters):
     inlet: float | None = quantity(
         "1",
         "position x/a at which the oil film begins, in Hertzian half widths a; negative, because the middle of the "
-        "contact is at 0. Without it, the contact is fully flooded",
+        "contact is at 0. If inlet is not given, the contact is fully flooded",
         lt=0,
         default=None,
     )
     slide_roll_ratio: float = quantity(
         "1",
-        "slide-roll ratio (u1 - u2)/u of the surface velocities u1 and u2 with the mean u; 0 is pure rolling",
+        "slide-roll ratio (u1 - u2)/u; u1 and u2 are the velocities of the surfaces, and u is their mean. 0 is pure "
+        "rolling",
         usual="0.25, 25 %",
         ge=0,
         default=0.0,
@@ -104,7 +106,7 @@ class EhlLineParameters(Parameters):
         "newtonian", description="law of the shear stress as a function of the shear rate"
     )
     eyring_stress: float = quantity(
-        "Pa", "Eyring stress of the oil, for shear_law: eyring", usual="5 MPa", gt=0, default=5e6
+        "Pa", "Eyring stress of the oil, used only with shear_law: eyring", usual="5 MPa", gt=0, default=5e6
     )
     profile_start: float = quantity(
         "1", "first position x/a at which film and pressure are stored, in Hertzian half widths a", default=-4.0
@@ -116,7 +118,7 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Raise ValueError unless one parameter of each pair is given, with the further parameters that it needs."""
+        """Raise ValueError unless one parameter of each pair is given, together with the others that it requires."""
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:
@@ -146,15 +148,25 @@ OUTPUTS = (
         has_error=True,
     ),
     Output("pressure", "Pa", "pressure in the film", ("position",), default=False, has_error=True),
-    Output("formula_central_film", "1", "relative central film thickness h_c/R by Pan and Hamrock", default=False),
-    Output("formula_minimum_film", "1", "relative minimum film thickness h_min/R by Pan and Hamrock", default=False),
+    Output(
+        "formula_central_film",
+        "1",
+        "relative central film thickness h_c/R from the formula of Pan and Hamrock",
+        default=False,
+    ),
+    Output(
+        "formula_minimum_film",
+        "1",
+        "relative minimum film thickness h_min/R from the formula of Pan and Hamrock",
+        default=False,
+    ),
     Output("minimum_position", "1", "position x/a of the minimum film thickness", default=False, has_error=True),
     Output("rupture_position", "1", "position x/a of the end of the film", default=False, has_error=True),
     Output("spike_position", "1", "position x/a of the pressure spike", default=False, has_error=True),
     Output(
         "spike_pressure",
         "Pa",
-        "largest pressure of the spike; with Barus' law it does not converge when the grid is refined",
+        "largest pressure of the spike; with Barus' law, this pressure does not converge when the grid is refined",
         default=False,
         has_error=True,
     ),
@@ -176,9 +188,10 @@ OUTPUTS = (
 
 
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
-    """Return the dimensionless parameters W (load), U (speed) and G (material), given or computed.
+    """Return the dimensionless parameters W (load), U (speed) and G (material).
 
-    `lookup` returns the values of a parameter, or None if it is not given.
+    Those that a user does not give are computed. ``lookup(name)`` returns the values of the parameter `name`, or None
+    if the user does not give this parameter.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")
@@ -200,10 +213,10 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 
 
 def operations(block: Block[EhlLineParameters]) -> float:
-    """Return the approximate number of operations of `compute`, from measured numbers for one solution.
+    """Return the approximate number of operations that `compute` needs for a block.
 
-    A solution with the default accuracy needs about 6 million. The finest grid, which the pressure and its spike need
-    if an accuracy is given, needs 1.5 billion.
+    The operations of one solution were measured: about 6 million with the default accuracy. If a campaign with an
+    accuracy requests the pressure or its spike, a solution needs the finest grid and 1.5 billion operations.
     """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
@@ -212,7 +225,7 @@ def operations(block: Block[EhlLineParameters]) -> float:
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory of a solution on the finest grid in bytes: about three matrices of 1281 x 1281 numbers."""
+    """Return the memory in bytes of a solution on the finest grid: about three matrices of 1281 x 1281 numbers."""
     return 3.0 * 8 * 1281**2
 
 

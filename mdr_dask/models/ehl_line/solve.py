@@ -1,4 +1,4 @@
-"""Solution of a block of lubricated line contacts."""
+"""Solve a block of cases: lubricated line contacts."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution,
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Outputs that are positions, in half widths of the contact. The relative error of a position is the error divided by
-#: one half width, or by the position if the position is larger.
+#: Outputs that are positions x/a. The relative error of a position is its error divided by 1 or by the absolute value
+#: of x/a, whichever is larger.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 
@@ -37,7 +37,7 @@ def _groups(block: Block[EhlLineParameters]) -> Groups:
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
-    """Return the dimensionless problem of every case; cases with equal dimensionless problems share a solution."""
+    """Return the dimensionless problem of every case. Cases whose dimensionless problems are equal share a solution."""
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
     return [
@@ -51,9 +51,10 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return a function for each output that evaluates the output from the solution on one grid.
+    """Return one function for each output. It computes the output from the solution on one grid.
 
-    Positions are in half widths a, film thicknesses in a^2/R, and pressures in units of Hertz' maximum pressure.
+    The functions return positions divided by the half width a, film thicknesses divided by a^2/R, and pressures
+    divided by Hertz' maximum pressure.
     """
     p0 = highest_pressure(case.contact_modulus, W)
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None

@@ -1,4 +1,4 @@
-"""Parameters and outputs of ``fretting_wear``, dimensionless or dimensional."""
+"""Parameters and outputs of the model ``fretting_wear``. A campaign is either dimensionless or dimensional."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mdr_dask.tables import read_table
 
 
 class Parabola(indenter.Parabola):
-    """A paraboloid, which approximates a sphere."""
+    """A paraboloid, as an approximation of a sphere."""
 
     shape: Literal["parabola"] = "parabola"
     radius: float | None = quantity(  # type: ignore[assignment]
@@ -36,7 +36,7 @@ class Cone(indenter.Cone):
 
 
 class Power(indenter.Power):
-    """A body of revolution c r^n."""
+    """A body of revolution with the height c r^n at the radius r."""
 
     exponent: float = quantity("1", "exponent n of the body c r^n", usual="2", gt=0.1, le=50)
     coefficient: float | None = quantity(  # type: ignore[assignment]
@@ -45,10 +45,10 @@ class Power(indenter.Power):
 
 
 class Table(Parameters):
-    """A measured profile: a table with the columns radius and height, and their units."""
+    """A measured profile in a table. Its columns are radius and height, each with its unit."""
 
     shape: Literal["table"]
-    file: NamedFile = Field(description="table with the columns radius and height, and their units")
+    file: NamedFile = Field(description="table with the columns radius and height, each with its unit")
 
     @field_validator("file")
     @classmethod
@@ -71,20 +71,24 @@ def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
 
 
 Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]
-#: Bodies whose height is not a power of the radius. For these bodies, each indentation depth needs its own
+#: Bodies whose height is not a power of the radius. Each indentation depth of such a body needs a separate
 #: one-dimensional image.
 Pressed = RoundedCone | Table
 
-#: The parameter that gives the size of a body in a dimensional campaign.
+#: For each shape of a body, the parameter that states its size in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
 
 
 class LoadStep(Parameters):
     """One block of a load history."""
 
-    cycles: float = quantity("1", "cycles of the block (N in a dimensionless campaign)", usual="10000", ge=0)
-    amplitude_factor: float = quantity("1", "amplitude over the campaign's amplitude", gt=0, default=1.0)
-    load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
+    cycles: float = quantity("1", "number of cycles of the block (N in a dimensionless campaign)", usual="10000", ge=0)
+    amplitude_factor: float = quantity(
+        "1", "amplitude in the block divided by the amplitude of the campaign", gt=0, default=1.0
+    )
+    load_factor: float = quantity(
+        "1", "depth or force that is held in the block, divided by its value before wear", gt=0, default=1.0
+    )
 
 
 #: Message if the fast rule is requested under constant force.
@@ -95,7 +99,7 @@ _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 class FrettingWear(Parameters):
     """Parameters of fretting wear, or of sliding wear if a `path` is given.
 
-    A campaign without moduli is dimensionless.
+    With `stick_radius`, or with `path` but no `contact_modulus`, the campaign is dimensionless.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -122,25 +126,33 @@ class FrettingWear(Parameters):
     overrides: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles", "last_radius": "extent"}
     settings: ClassVar[frozenset[str]] = frozenset({"cells", "extent", "last_radius", "points"})
     requires: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
-    indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
+    indenter: Indenter = Field(
+        Parabola(), description="body before wear; a dimensionless campaign does not need its size"
+    )
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",
-        description="exact evolution; fast rule of the thesis, whose stated error is that of its own equation; "
-        "or limit, the end of all wear",
+        description="exact: numerical solution of the wear equation. fast: approximate rule of the thesis; the stored "
+        "errors do not include the error of this approximation. limit: profile at which wear ends",
     )
-    hold: Literal["depth", "force"] = Field("depth", description="what stays constant while the body wears")
+    hold: Literal["depth", "force"] = Field(
+        "depth", description="quantity that stays constant while the body wears: indentation depth or force"
+    )
     cycles: float = quantity(
-        "1", "number of cycles; N = cycles / N0 in a dimensionless campaign", usual="10000", ge=0, default=1.0
+        "1",
+        "number of cycles; in a dimensionless campaign, the number N = cycles / N0",
+        usual="10000",
+        ge=0,
+        default=1.0,
     )
     path: float | None = quantity(
         "m",
-        "sliding path, in place of cycles and amplitude: gross slip in one direction "
-        "(k E* l / (sigma0 a0) in a dimensionless campaign)",
+        "length l of a sliding path in one direction with gross slip, given in place of cycles and amplitude; in a "
+        "dimensionless campaign, k E* l / (sigma0 a0)",
         ge=0,
         default=None,
     )
     stick_radius: float | None = quantity(
-        "1", "stick radius c over the first contact radius a0", usual="0.5", gt=0, lt=1, default=None
+        "1", "stick radius c divided by the contact radius a0 before wear", usual="0.5", gt=0, lt=1, default=None
     )
     amplitude: float | None = quantity(
         "m", "amplitude U0 of the tangential oscillation", usual="1 um", gt=0, default=None
@@ -150,27 +162,41 @@ class FrettingWear(Parameters):
         "Pa", "effective shear modulus G* of the pair", usual="90 GPa", gt=0, default=None
     )
     friction: float | None = quantity("1", "coefficient of friction", usual="0.6", gt=0, default=None)
-    normal_force: float | None = quantity("N", "normal force of the virgin contact", usual="50 N", gt=0, default=None)
-    depth: float | None = quantity("m", "indentation depth of the virgin contact", usual="1 um", gt=0, default=None)
-    hardness: float | None = quantity("Pa", "hardness in the wear law", usual="2 GPa, 200 HV", gt=0, default=None)
-    wear_coefficient: float | None = quantity(
-        "1", "wear coefficient k of the law V = k F u / hardness", usual="1e-4", ge=0, default=None
+    normal_force: float | None = quantity("N", "normal force before wear", usual="50 N", gt=0, default=None)
+    depth: float | None = quantity("m", "indentation depth before wear", usual="1 um", gt=0, default=None)
+    hardness: float | None = quantity(
+        "Pa", "hardness in the wear law V = k F u / hardness", usual="2 GPa, 200 HV", gt=0, default=None
     )
-    xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
-    cells: int = quantity("1", "cells of the grid of histories", ge=20, le=2000, default=200)
-    friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)
+    wear_coefficient: float | None = quantity(
+        "1", "wear coefficient k in the wear law V = k F u / hardness", usual="1e-4", ge=0, default=None
+    )
+    xi: float = quantity(
+        "1", "factor xi of the fast rule; docs/wear.md states the error of this rule", gt=0, default=0.8
+    )
+    cells: int = quantity(
+        "1", "number of cells of the grid on which a load history is computed", ge=20, le=2000, default=200
+    )
+    friction_scatter: float = quantity(
+        "1", "relative scatter of the coefficient of friction (log-normal)", ge=0, le=2, default=0.0
+    )
     amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)
-    wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)
-    history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load in place of cycles")] = ()
-    extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
+    wear_coefficient_scatter: float = quantity(
+        "1", "relative scatter of the wear coefficient (log-normal)", ge=0, le=2, default=0.0
+    )
+    history: Annotated[
+        tuple[LoadStep, ...], Field(strict=False, description="blocks of a load history, given in place of cycles")
+    ] = ()
+    extent: float = quantity(
+        "1", "last radius of the profiles, divided by the contact radius a0 before wear", gt=0, le=10, default=1.6
+    )
     last_radius: float | None = quantity(
         "m",
-        "last radius of the profiles, in place of extent: radius and position are then lengths",
+        "last radius of the profiles, given in place of extent; the coordinates radius and position are then in m",
         usual="100 um",
         gt=0,
         default=None,
     )
-    points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
+    points: int = quantity("1", "number of points of the profiles", ge=2, le=10000, default=161)
 
     @property
     def dimensionless(self) -> bool:
@@ -204,7 +230,7 @@ class FrettingWear(Parameters):
         oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
         given = [name for name in oscillating if getattr(self, name)]
         if given:
-            raise ValueError(f"a path is sliding in one direction: leave out {', '.join(given)} (oscillation)")
+            raise ValueError(f"path means sliding in one direction: leave out {', '.join(given)} (oscillation)")
         if self.wear_rule != "exact":
             raise ValueError(f"expected wear_rule exact for sliding along a path, got {self.wear_rule!r}")
         return self
@@ -229,8 +255,9 @@ class FrettingWear(Parameters):
         if self.wear_rule != "fast":
             return ()
         return (
-            "wear_rule fast is an approximation: it differs from the exact profile by a few hundredths of d0, and "
-            "by up to a third of d0 at small stick radii; stored errors are those of its own equation (docs/wear.md)",
+            "wear_rule fast is an approximation: its profile differs from the exact profile by a few hundredths of d0, "
+            "and by up to a third of d0 at small stick radii; the stored errors do not include this difference "
+            "(docs/wear.md)",
         )
 
     def _check_dimensional(self) -> None:
@@ -255,22 +282,26 @@ def _output(name: str, unit: str, meaning: str, dims: tuple[str, ...] = (), *, d
 
 
 OUTPUTS = (
-    _output("contact_radius", "m", "radius of the wear scar (a0 = 1 in a dimensionless campaign)", default=True),
-    _output("wear_volume", "m^3", "worn volume (a0^2 d0 = 1 in a dimensionless campaign)", default=True),
+    _output(
+        "contact_radius", "m", "radius of the wear scar (in units of a0 in a dimensionless campaign)", default=True
+    ),
+    _output("wear_volume", "m^3", "worn volume (in units of a0^2 d0 in a dimensionless campaign)", default=True),
     _output(
         "contact_force",
         "N",
-        "normal force on the worn contact (E* d0 a0 = 1 in a dimensionless campaign)",
+        "normal force on the worn contact (in units of E* d0 a0 in a dimensionless campaign)",
         default=True,
     ),
-    _output("stick_border", "m", "stick radius (a0 = 1 in a dimensionless campaign)"),
-    _output("worn_depth", "m", "largest worn depth (d0 = 1 in a dimensionless campaign)"),
-    _output("worn_profile", "m", "worn profile f(r), from the virgin apex", ("radius",)),
+    _output("stick_border", "m", "stick radius (in units of a0 in a dimensionless campaign)"),
+    _output("worn_depth", "m", "largest worn depth (in units of d0 in a dimensionless campaign)"),
+    _output("worn_profile", "m", "worn profile f(r), measured from the apex of the body before wear", ("radius",)),
     _output("worn_image", "m", "worn one-dimensional image g(x)", ("position",)),
-    _output("pressure", "Pa", "contact pressure p(r) (E* d0 / a0 = 1 in a dimensionless campaign)", ("radius",)),
+    _output(
+        "pressure", "Pa", "contact pressure p(r) (in units of E* d0 / a0 in a dimensionless campaign)", ("radius",)
+    ),
     _output("block_contact_radius", "m", "contact radius after every block of load", ("block",)),
     _output("block_stick_border", "m", "stick radius at the end of every block of load", ("block",)),
-    _output("block_depth", "m", "depth at the end of every block of load", ("block",)),
+    _output("block_depth", "m", "indentation depth at the end of every block of load", ("block",)),
     _output("block_contact_force", "N", "normal force at the end of every block of load", ("block",)),
     _output("block_wear_volume", "m^3", "worn volume after every block of load", ("block",)),
     _output("block_worn_profile", "m", "worn profile after every block of load", ("block", "radius")),
@@ -283,7 +314,7 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
         places, unit, over = (
             np.linspace(0.0, parameters.extent, parameters.points),
             "1",
-            " over the first contact radius a0",
+            " divided by the contact radius a0 before wear",
         )
     else:
         places, unit, over = np.linspace(0.0, parameters.last_radius, parameters.points), "m", ""
@@ -295,7 +326,7 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units that differ from the declared units: those of outputs and path in a dimensionless campaign."""
+    """Return the units that differ from the declared ones: ``"1"`` for path and outputs of dimensionless campaigns."""
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 
@@ -318,11 +349,11 @@ MODEL = Model(
     units=units,
     notes=deferred("mdr_dask.models.fretting_wear.reduction", "notes"),
     numbers=(
-        Number("stick_share", "stick_border / contact_radius", "stick radius over the radius of the wear scar"),
+        Number("stick_share", "stick_border / contact_radius", "stick radius divided by the radius of the wear scar"),
         Number(
             "archard_share",
             "wear_volume * hardness / (4 * wear_coefficient * normal_force * amplitude * cycles)",
-            "worn volume over that of gross slip by Archard's law",
+            "worn volume divided by the volume that Archard's law gives for gross slip",
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""Conversion of the parameters of a block to dimensionless numbers for every case and realisation."""
+"""Convert the parameters of a block to dimensionless numbers for every case and realisation."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from mdr_dask.models.parts.indenter import RoundedCone
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
 
-#: The units of length, height and force of a case must lie between LEAST and 1 / LEAST. The cubes of these units then
-#: do not overflow.
+#: The units of length, height and force of a case must lie between LEAST and 1 / LEAST, so that the cubes of these
+#: units do not overflow.
 LEAST = 1e-60
 MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
 
@@ -31,7 +31,8 @@ class Numbers:
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
     stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
-    in sliding wear. `advance` is N divided by the number of cycles. The units are a0, d0 and E* d0 a0.
+    in sliding wear. `advance` is this number divided by the parameter `cycles` or `path`. The units `length`, `height`
+    and `force` are a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray
@@ -47,7 +48,8 @@ class Numbers:
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     """Return a list of indenters: one for every case, or a single one for all cases.
 
-    A single indenter also stands for power laws of the same shape, such as cones with different angles.
+    Cases whose indenters are power laws of one shape, such as cones with different angles, share one element
+    of the list.
     """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
@@ -55,7 +57,7 @@ def indenters(block: Block[FrettingWear]) -> list[Indenter]:
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of the body of every case; NaN for a body without these numbers."""
+    """Return coefficient and exponent of the body of every case; both are NaN if the body is not a power law."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Pressed) else one.power_law() for one in indenters(block)]
@@ -86,7 +88,7 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
-    """Return log-normal random factors with the mean 1, shape (cases, realisations)."""
+    """Return log-normal factors of mean 1, shape (cases, realisations). The parameter `name` is their scatter."""
     width = np.sqrt(np.log1p(block.numbers(name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
 
@@ -143,9 +145,9 @@ def _first_contact(
     modulus: FloatArray,
     messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return contact radius a0 and depth d0 of every case.
+    """Return the contact radius a0 and the indentation depth d0 before wear, for every case.
 
-    Add a message if a body is known only up to a radius below a0.
+    Add a message for every case without a result, for example if its table ends at a radius below a0.
     """
     from mdr_dask.physics.mdr import power_law_contact as contact
 
@@ -200,7 +202,7 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
 
 
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
-    """Return a note if cases of a study will fail, judged without random scatter."""
+    """Return a note if cases of a study will fail. This is judged with all random scatter set to zero."""
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)

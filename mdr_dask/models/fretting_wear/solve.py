@@ -1,7 +1,7 @@
-"""Solution of a block of fretting wear.
+"""Solve a block of cases: fretting wear.
 
-With the exact rule and no load history, one solution for each combination of body and stick radius gives the results at
-all numbers of cycles.
+With the exact rule and no load history, cases with the same body and stick radius share one solution, which gives the
+results at all numbers of cycles.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from mdr_dask.physics.wear.exact import COARSEST_OF_MOVING, exact
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn, virgin_load
 
-#: Outputs that can be computed in closed form, for many cases at once.
+#: Quantities that can be computed in closed form, for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Outputs whose quantity has another name in `Worn`, each with that other name. The output `contact_force` cannot be
-#: called `normal_force`, because a parameter already has this name.
+#: Outputs that have another name in `Worn`, each with its name there. The output `contact_force` cannot be called
+#: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Requested error of the profile, divided by eta d0, in a solution of the evolution. The requested error is `_USUAL` if
-#: the campaign states no accuracy, and never below `_FINEST`.
+#: Tolerance of a solution: largest allowed error of the worn profile, divided by eta d0. The tolerance is `_USUAL` if
+#: the campaign states no accuracy. It is never below `_FINEST`.
 _USUAL, _FINEST = 1e-3, 1e-5
-#: If the campaign states an accuracy, the first solution requests the error `_FIRST` times the accuracy. If an output
-#: then misses the accuracy, the next solution requests `_FINER` times this error.
+#: If the campaign states an accuracy, the tolerance of the first solution is `_FIRST` times the accuracy. If an output
+#: then misses the accuracy, the case is solved again with `_FINER` times this tolerance.
 _FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
 
 #: Indices (case, realisation) in a block.
@@ -48,7 +48,7 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """Input of a solution that several cases share: all data except N and the factor xi of the fast rule.
+    """All data of a case except N and the factor xi of the fast rule. Several cases can have the same task.
 
     `extent` is the last radius of the profiles, divided by a0.
     """
@@ -109,7 +109,7 @@ def operations(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the number of operations to solve one evolution and its errors, without the evaluation at each N."""
+    """Return the number of operations that one evolution and its errors need, without the evaluation at each N."""
     if hold == "force":
         return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
@@ -126,14 +126,14 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the name of the quantity of `Worn` that an output contains, and whether the output is its error."""
+    """Return the name of a quantity of `Worn`, and whether the output `name` is the error of this quantity."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
 
 
 def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
-    """Return the sizes of the dimensions of an output, without the dimensions of cases and realisations."""
+    """Return the shape that an output has for one case and one realisation."""
     lengths = {"block": max(len(parameters.history), 1)}
     return tuple(lengths.get(dim, parameters.points) for dim in MODEL.output(name).dims)
 
@@ -157,9 +157,9 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
-    """Return whether closed forms give all outputs of a block.
+    """Return whether closed forms give all requested outputs of a block.
 
-    They do so for power laws at constant depth, by the limit or the fast rule, without a load history.
+    Closed forms exist for power laws at constant depth without a load history, with the limit or the fast rule.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -176,7 +176,7 @@ def _solve_plain(
 ) -> int:
     """Compute all cases of a block together, by the closed forms of the limiting profile or of the fast rule.
 
-    Return the number of different cases.
+    Return the number of different cases, each of which is computed once.
     """
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
@@ -256,12 +256,12 @@ def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float)
 
 
 def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatArray) -> str:
-    """Return a message about outputs that miss the accuracy; return an empty string if there are no such outputs."""
+    """Return a message about the outputs that miss the accuracy, or an empty string if no output misses it."""
     if block.accuracy is None:
         return ""
 
     def finite(name: str) -> FloatArray:
-        """Return an output of the case as an array with one row. Infinite values, as at a sharp tip, become NaN."""
+        """Return an output as an array with one row. Infinite values, as for pressure at a sharp tip, become NaN."""
         answer = np.asarray(_answer(records, name, places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
 
@@ -271,7 +271,7 @@ def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatAr
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
-    """Return the number of solutions of a task: one if a single solution gives the results at all N."""
+    """Return the number of solutions of a task: 1 if one solution gives all results, otherwise 1 for each (N, xi)."""
     marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
     return 1 if marched or task.rule == "limit" else len(wanted)
 
@@ -279,7 +279,7 @@ def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
 def _tasks(
     block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
 ) -> dict[Task, dict[tuple[float, float], Places]]:
-    """Return the tasks, and for each pair (N, xi) of a task the results (case, realisation) that need it."""
+    """Return each task with its pairs (N, xi), and each pair with the indices (case, realisation) of its results."""
     tasks: dict[Task, dict[tuple[float, float], Places]] = {}
     bodies = indenters(block)
     for case in range(block.cases):
@@ -319,7 +319,7 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 
 def _first_resolution(accuracy: float | None, hold: str) -> float:
-    """Return the error of the profile, divided by eta d0, that is allowed in the first solution."""
+    """Return the tolerance of the first solution: the allowed error of the worn profile, divided by eta d0."""
     return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 
@@ -347,7 +347,7 @@ def _contacts(
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Return the contacts for every pair (N, xi): after every block of a history, otherwise a single contact."""
+    """Return contacts for every pair (N, xi): one for each block of a load history, or one if there is no history."""
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)

@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `mixed_lubrication`; quick to import."""
+"""Parameters and outputs of the model `mixed_lubrication`. This module does not import the solver."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Number of the shortest waves on the circumference of a roller, if neither `shortest_wavelength` nor `points` is
-#: given.
+#: Circumference of a roller divided by the shortest wavelength, if a user gives neither `shortest_wavelength` nor
+#: `points`.
 WAVES = 100_000
-#: Positions of the profiles, in half widths of the contact.
+#: Positions at which the profiles are stored, divided by the half width of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
 
@@ -54,7 +54,8 @@ class MixedLubrication(Parameters):
     temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
     slide_roll_ratio: float = quantity(
         "1",
-        "slide-roll ratio (v1 - v2)/u of the surface velocities v1 and v2 with the mean u; 0 is pure rolling",
+        "slide-roll ratio (v1 - v2)/u; v1 and v2 are the velocities of the surfaces, and u is their mean. 0 is pure "
+        "rolling",
         default=0.0,
         ge=-2,
         le=2,
@@ -74,7 +75,8 @@ class MixedLubrication(Parameters):
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
         "longest wavelength of the roughness; auto is the width 2a of the Hertzian contact under cutoff_force. With "
-        "measured profiles, this wavelength affects only the load on the asperities",
+        "measured profiles, it does not change the lines, but only the load on the asperities and the number of "
+        "independent squares",
         usual="0.4 mm",
         default="auto",
     )
@@ -87,8 +89,8 @@ class MixedLubrication(Parameters):
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "shortest wavelength of the roughness; auto is ten times the spacing of `points` if their number is given, "
-        "otherwise the circumference of a roller divided by 100 000",
+        "shortest wavelength of the roughness; auto is ten times the distance between neighbouring points if `points` "
+        "is a number, otherwise the circumference of a roller divided by 100 000",
         usual="3 um",
         default="auto",
     )
@@ -107,8 +109,8 @@ class MixedLubrication(Parameters):
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
     ) = quantity(
         "1/Pa",
-        "pressure-viscosity coefficient alpha, or the name of a correlation by which it follows from the viscosity; "
-        "oil means the correlation that belongs to the parameter oil",
+        "pressure-viscosity coefficient alpha, or the name of a correlation that gives alpha as a function of the "
+        "viscosity; the value oil selects the correlation that belongs to the oil",
         usual="20 1/GPa",
         default="oil",
     )
@@ -117,17 +119,18 @@ class MixedLubrication(Parameters):
         description="formula for the film thickness; with ehl, the contact is solved as in the model ehl_line",
     )
     film_thickness: Positive | None = quantity(
-        "m", "given film thickness; film_formula is then not used", usual="100 nm", default=None
+        "m", "film thickness h0, if it is known; film_formula is then not used", usual="100 nm", default=None
     )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
         default="part",
-        description="treatment of a cluster of asperities that an edge of the contact cuts. part: its part inside the "
-        "contact is tested for breakthrough and counted. clip: the whole cluster is tested, and its part inside is "
-        "counted. whole: the whole cluster is tested and counted. inside: the cluster is ignored",
+        description="treatment of a cluster of asperities that lies across an edge of the contact. part: only the part "
+        "of the cluster inside the contact is tested for breakthrough, and this part is counted. clip: the whole "
+        "cluster is tested, but only the part inside is counted. whole: the whole cluster is tested and counted. "
+        "inside: the cluster is ignored",
     )
     roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
     roller_width: float = quantity(
-        "m", "width of the rollers, which is the length L' of the contact", usual="10 mm", default=0.01, gt=0
+        "m", "width of the rollers, equal to the length L' of the contact", usual="10 mm", default=0.01, gt=0
     )
     contact_modulus: float = quantity(
         "Pa",
@@ -175,7 +178,7 @@ class MixedLubrication(Parameters):
         return self.roller_radius / 2
 
     def source(self) -> Source:
-        """Return the source of the rough lines. Cases with equal sources share their lines."""
+        """Return the object that makes the rough lines. Cases for which these objects are equal share their lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
@@ -235,11 +238,11 @@ class MixedLubrication(Parameters):
         return ""
 
     def oil_data(self) -> Oil:
-        """Return the oil, found by its name or made from the given data."""
+        """Return the named oil, or the oil that the data in the campaign define."""
         return OILS[self.oil] if isinstance(self.oil, str) else self.oil.oil
 
     def dry_contact(self, force: float) -> HertzLine:
-        """Return the Hertzian contact of the smooth rollers under a normal force in N."""
+        """Return the Hertzian contact of smooth rollers under the normal force `force` in N."""
         return hertz_line(force / self.roller_width, self.contact_modulus, self.radius)
 
 
@@ -251,48 +254,64 @@ OUTPUTS = (
         has_error=True,
         scatter="revolution_error",
     ),
-    Output(
-        "contact_length", "m", "mean length of one line that is in intimate contact", has_error=True, comment=NO_AREA
-    ),
+    Output("contact_length", "m", "mean length in intimate contact on one line", has_error=True, comment=NO_AREA),
     Output("film", "m", "film thickness h0", has_error=True),
     Output("film_ratio", "1", "film thickness divided by the combined rms height of the rollers", has_error=True),
-    Output("asperity_load_share", "1", "fraction of the load carried by asperities, not by the film", has_error=True),
+    Output("asperity_load_share", "1", "fraction of the load that asperities carry", has_error=True),
     Output(
         "independent_squares",
         "1",
-        "number of independent squares across the rollers: their width divided by the longest wavelength. One rough "
-        "line represents one square",
+        "number of independent squares across the width of the rollers: this width divided by the longest wavelength. "
+        "One rough line represents one square",
     ),
     Output(
         "revolution_error",
         "1",
-        "standard error of breakthrough_probability in one revolution, estimated from parts of the revolution",
+        "standard error of breakthrough_probability in one revolution, from the scatter between its parts",
         default=False,
     ),
     Output(
         "contact_conductance",
         "S",
-        "mean electrical conductance of all contact spots in the width of the rollers",
+        "mean electrical conductance of all contact spots across the width of the rollers",
         default=False,
         has_error=True,
     ),
     Output(
         "contact_resistance",
         "ohm",
-        "electrical contact resistance: the reciprocal of contact_conductance, infinite without contact",
+        "electrical contact resistance: the reciprocal of contact_conductance; infinite if there is no contact",
         default=False,
         has_error=True,
     ),
     Output(
-        "friction_coefficient", "1", "coefficient of friction of asperities and oil film", default=False, has_error=True
+        "friction_coefficient",
+        "1",
+        "coefficient of friction, from asperities and oil film together",
+        default=False,
+        has_error=True,
     ),
     Output("contact_half_width", "m", "half width a of the Hertzian contact", default=False),
-    Output("contact_length_trace", "m", "length in intimate contact against rolling angle", ("angle",), default=False),
     Output(
-        "upper_profile", "m", "profile of roller 1 at the angle of largest contact_length", ("position",), default=False
+        "contact_length_trace",
+        "m",
+        "length in intimate contact as a function of the rolling angle",
+        ("angle",),
+        default=False,
     ),
     Output(
-        "lower_profile", "m", "profile of roller 2 at the angle of largest contact_length", ("position",), default=False
+        "upper_profile",
+        "m",
+        "profile of roller 1 at the angle at which the length in intimate contact is largest",
+        ("position",),
+        default=False,
+    ),
+    Output(
+        "lower_profile",
+        "m",
+        "profile of roller 2 at the angle at which the length in intimate contact is largest",
+        ("position",),
+        default=False,
     ),
 )
 
@@ -309,7 +328,7 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     }
 
 
-#: Parameters on which the lines depend; cases with equal values of these parameters share their lines.
+#: Parameters on which the rough lines depend. Cases with equal values of all these parameters share their lines.
 OF_LINES = {
     *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
     *("roller_radius", "roller_width", "contact_modulus"),
@@ -361,7 +380,7 @@ MODEL = Model(
         Number(
             "rig_probability",
             "1 - (1 - breakthrough_probability) ** independent_squares",
-            "fraction of time in which the layer is broken somewhere across the rollers, for independent squares",
+            "fraction of time in which the layer is broken somewhere across the rollers, if squares are independent",
         ),
     ),
 )

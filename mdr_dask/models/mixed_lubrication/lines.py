@@ -1,4 +1,4 @@
-"""The two rough lines of a case: self-affine, with the spectra of measured surfaces, or measured profiles."""
+"""The two rough lines of a case. They are self-affine, have the spectra of measured surfaces, or are measured."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 #: Largest number of points of a line.
 MOST_POINTS = 10**7
-#: With `points: auto`, the coarsest grid has `LEAST_PER_WAVE` points in each shortest wavelength. This number of points
-#: is doubled up to `DOUBLINGS` times.
+#: With `points: auto`, the coarsest grid has `LEAST_PER_WAVE` points per shortest wavelength. This number is doubled up
+#: to `DOUBLINGS` times.
 LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 
 
@@ -31,7 +31,8 @@ class _Random:
     """Base class of pairs of rough lines with random phases.
 
     `points` is the number of points of each grid, from coarse to fine; the lines have the same waves on every grid.
-    `longest` and `modes` are the circumference of a roller divided by the longest and by the shortest wavelength.
+    `longest` is the circumference of a roller divided by the longest wavelength, and `modes` is the circumference
+    divided by the shortest wavelength.
     """
 
     points: tuple[int, ...]
@@ -39,11 +40,11 @@ class _Random:
     modes: int
 
     def length(self, perimeter: float) -> float:
-        """Return the length of the lines in m around a roller with the circumference `perimeter` in m."""
+        """Return the length of the lines in m: the circumference `perimeter` of a roller."""
         return perimeter
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why a roller cannot have these lines; return an empty string if it can."""
+        """Return the reason why these lines are impossible, or an empty string if they are possible."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
@@ -53,14 +54,14 @@ class _Random:
         return ""
 
     def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of both lines."""
+        """Return the amplitudes of the waves of line 1 and of line 2."""
         raise NotImplementedError
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).
 
-        The random phases are drawn in turn for both lines, from the longest wave to the shortest. Therefore the longer
-        waves stay the same if shorter waves are added.
+        For each wavelength, from the longest to the shortest, one random phase is drawn for each line. Therefore the
+        longer waves stay the same if shorter waves are added.
         """
         from mdr_dask.physics.surfaces.roughness import phase_factors
         from mdr_dask.physics.surfaces.splines import closest
@@ -77,11 +78,11 @@ class Generated(_Random):
     hurst: float
 
     def combined_rms(self) -> float:
-        """Return the rms height of both lines together."""
+        """Return the rms height of the sum of the two lines."""
         return float(np.sqrt(2.0))
 
     def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of both lines."""
+        """Return the amplitudes of the waves of line 1 and of line 2."""
         from mdr_dask.physics.surfaces import roughness
 
         amplitude = roughness.amplitudes(self.modes, self.hurst, longest=self.longest)
@@ -90,24 +91,24 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m. The realisations use the files of a surface in turn."""
+    """Two lines in m with the spectra of measured surfaces. The realisations use the files of a surface in turn."""
 
     surface_1: Surface
     surface_2: Surface
     perimeter: float
 
     def combined_rms(self) -> float:
-        """Return the combined rms height of both lines in m, as a mean over all files."""
+        """Return the rms height in m of the sum of the two lines, with squares averaged over the files of a surface."""
         squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
         return float(np.sqrt(sum(squares)))
 
     def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of both lines."""
+        """Return the amplitudes of the waves of line 1 and of line 2."""
         first, second = (lines[realisation % len(lines)] for lines in self._both())
         return first, second
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why these lines are impossible, or an empty string."""
+        """Return the reason why these lines are impossible, or an empty string if they are possible."""
         flat = "expected roughness of both surfaces between longest_wavelength and shortest_wavelength, got none"
         return super().problem(perimeter) or (
             "" if all(np.any(line) for both in self._both() for line in both) else flat
@@ -132,7 +133,7 @@ class Measured:
 
     @property
     def points(self) -> tuple[int, int]:
-        """Numbers of points on the coarse and the fine grid; both lines are cut to an even number of points."""
+        """Numbers of points on the coarse and the fine grid. Both lines are cut to the same even number of points."""
         half = min(line_of(file).height.size for file in (self.file_1, self.file_2)) // 2
         return half, 2 * half
 
@@ -141,22 +142,22 @@ class Measured:
         return self.points[-1] * line_of(self.file_1).spacing
 
     def problem(self, _: float) -> str:
-        """Return the reason why the lines cannot be combined, or an empty string."""
+        """Return the reason why the two lines cannot be combined, or an empty string if they can."""
         one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
         if abs(one - two) > 1e-3 * one:
             return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"
         return ""
 
     def combined_rms(self) -> float:
-        """Return the combined rms height of both lines. It is in m, or a pure number if the lines are scaled."""
+        """Return the rms height of the sum of the two lines: in m, or a pure number if the lines are scaled."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
-        """Return the interpolating splines of both lines, shape (2, points), on all points or on every second point.
+        """Return the interpolating splines of both lines, shape (2, points), through all points or every second point.
 
         During one revolution at the mean velocity, with a slide-roll ratio S, the contact travels (1 + S/2) times the
-        length of line 1, and (1 - S/2) times the length of line 2. Means over realisations are therefore unbiased only
-        if both lines begin at random points.
+        length of line 1, and (1 - S/2) times the length of line 2. It thus passes some points more often than others.
+        Both lines begin at random points, so that means over realisations are nevertheless unbiased.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 

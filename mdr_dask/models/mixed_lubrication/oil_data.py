@@ -39,7 +39,7 @@ class OilData(Parameters):
     viscosities: NamedFile | None = Field(
         default=None,
         description="table with the columns temperature and kinematic viscosity (or dynamic viscosity), in place of "
-        "the two viscosities; Walther's law is fitted to it",
+        "the two viscosities; Walther's law is fitted to the table",
     )
     density: float = quantity(
         "kg/m^3", "density of the oil at density_temperature", usual="870 kg/m^3, 0.87 g/cm^3", gt=0
@@ -49,18 +49,18 @@ class OilData(Parameters):
     )
     correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
         default="gold_mineral",
-        description="correlation by which the pressure-viscosity coefficient follows from the viscosity",
+        description="correlation that gives the pressure-viscosity coefficient as a function of the viscosity",
     )
     lowest_temperature: float | None = quantity(
         "K",
-        "lowest allowed temperature; by default the lowest one with a known viscosity",
+        "lowest allowed temperature; by default the lowest temperature at which the viscosity is given",
         usual="20 degC",
         default=None,
         gt=0,
     )
     highest_temperature: float | None = quantity(
         "K",
-        "highest allowed temperature; by default the highest one with a known viscosity",
+        "highest allowed temperature; by default the highest temperature at which the viscosity is given",
         usual="100 degC",
         default=None,
         gt=0,
@@ -79,7 +79,7 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s, from the user or the table."""
+        """Two temperatures in K, each followed by its kinematic viscosity in m^2/s: given, or fitted to the table."""
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])
@@ -90,7 +90,7 @@ class OilData(Parameters):
 
     @property
     def oil(self) -> Oil:
-        """The oil."""
+        """The oil that these data define."""
         one, _, two, _ = data = self.two_viscosities
         low, high = self.lowest_temperature or min(one, two), self.highest_temperature or max(one, two)
         return Oil(*data, self.density, self.density_temperature, self.correlation, low, high, "campaign file")
@@ -117,9 +117,10 @@ class OilData(Parameters):
 
 
 class _Fit(NamedTuple):
-    """Walther's law fitted to a table. The temperatures in K ascend.
+    """Walther's law fitted to a table.
 
-    `departures` are the relative deviations of the measured viscosities from the law.
+    `temperature` contains the temperatures of the table in K, in ascending order. `departures` are the relative
+    deviations of the measured viscosities from the law.
     """
 
     temperature: FloatArray
@@ -133,7 +134,7 @@ class _Fit(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
-    """Fit Walther's law to a table of viscosities; raise DataError if this is impossible."""
+    """Fit Walther's law to a table of viscosities; raise DataError if no fit is possible."""
     text = file.read_text()
     is_dynamic = any(converts(unit, "Pa s") for unit in read_sheet(text, file.name).units)
     viscous = Column("dynamic viscosity", "Pa s", above=0)

@@ -14,12 +14,12 @@ from mdr_dask.physics.lubrication.film_formulas import HertzLine
 from mdr_dask.physics.lubrication.load_sharing import Asperities, SharedLoad, share_load
 from mdr_dask.physics.outcome import Outcome
 
-#: Relative error of the film thickness that is allowed in an EHL solution if the campaign states no accuracy.
+#: Largest allowed relative error of the film thickness in an EHL solution if the campaign states no accuracy.
 ACCURACY = 1e-3
 
 
 class NoFilmError(Exception):
-    """The film of a case cannot be computed; the message is the reason."""
+    """Raised if the film of a case cannot be computed. The message states the reason."""
 
 
 class Film(NamedTuple):
@@ -34,8 +34,8 @@ class Operation:
     """The smooth contact, the film and the boundary layer of a case.
 
     `viscosity` is the dynamic viscosity in Pa s, `alpha` the pressure-viscosity coefficient in 1/Pa, and `width` the
-    width of the contact in m. `film_error` is the relative error of the film thickness. The heights of the lines are in
-    units of `scale`, which is in m; `strength` is the strength of the layer for heights in this unit.
+    width of the contact in m. `film_error` is the relative error of the film thickness. The heights of the lines are
+    divided by `scale` in m. `strength` is the strength of the boundary layer for heights that are divided by `scale`.
     """
 
     case: MixedLubrication
@@ -57,7 +57,7 @@ class Operation:
 
     @property
     def level(self) -> float:
-        """Film thickness in the unit of the heights of the lines."""
+        """Film thickness divided by `scale`, like the heights of the lines."""
         return self.film / self.scale
 
     @property
@@ -67,12 +67,12 @@ class Operation:
 
     @property
     def squares(self) -> float:
-        """Width of the rollers divided by the longest wavelength, which is the side of an independent square."""
+        """Number of independent squares across the rollers: their width divided by the longest wavelength."""
         return self.case.roller_width / self.case.longest()
 
     @property
     def rms(self) -> float:
-        """Combined rms height of both lines in m."""
+        """Rms height in m of the sum of the two lines."""
         return self.scale * self.source.combined_rms()
 
 
@@ -116,9 +116,10 @@ def _mean_pressure(case: MixedLubrication) -> float:
 def _shared_load(
     case: MixedLubrication, asperities: Asperities, film_of: tuple[Callable[[float], Film], str], accuracy: float
 ) -> tuple[SharedLoad, float, str]:
-    """Return the film thickness and the load shares, the relative error of the film thickness, and a warning.
+    """Return the film thickness with the load shares, the relative error of the film thickness, and a warning.
 
-    The warning is not empty if asperities would carry more than the load, or outside the range of the film formula.
+    The warning is empty unless asperities would carry more than the whole load at a given film thickness, or the case
+    is outside the range of the film formula.
     """
     pressure = _mean_pressure(case)
 
@@ -140,9 +141,9 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function that computes the film from the share of the load that it carries, and a warning.
+    """Return a function and a warning. The function computes the film for a given share of the load on the film.
 
-    The warning is not empty outside the range of the film formula.
+    The warning is empty unless the case is outside the range of the film formula.
     """
     E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius
@@ -171,7 +172,7 @@ def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
     """Return the central film thickness of the EHL solution in units of ``a^2/R``, and its relative error."""
     solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
-        return Film(0.0)  # the film is too thin for the grids; nearly all load will be on the asperities
+        return Film(0.0)  # the film is too thin for the grids; the asperities will carry nearly the whole load
     if solution.reason:
         raise NoFilmError(solution.reason)
     film = solution.central_film
@@ -189,7 +190,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # the error of the asperity load is the change of this load when the film becomes thinner by its own error
+        # the error of the asperity load is its change when the film becomes thinner by the error of the film thickness
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {

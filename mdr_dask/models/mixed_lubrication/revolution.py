@@ -17,8 +17,8 @@ from mdr_dask.physics.surfaces.splines import heights
 
 #: Largest number of parts into which a revolution is divided. The scatter between the parts gives the standard error.
 PARTS = 16
-#: In rolling with creep, the distance between neighbouring windows on the coarsest grid is the window width divided by
-#: this number. At this distance, neighbouring windows have nearly the same contact.
+#: With sliding, the distance between neighbouring windows on the coarsest grid is the width of a window divided by this
+#: number. At this distance, neighbouring windows have nearly the same contact.
 WINDOWS = 4
 
 
@@ -26,9 +26,9 @@ WINDOWS = 4
 class Revolution:
     """Intimate contact during one revolution of the rollers.
 
-    A window is the part of both lines that is in the Hertzian contact at one moment. `contact` is the length in
-    intimate contact in each window in units of `unit`, which is in m; the windows are equidistant in time. `parts` is
-    the number of equal parts of the revolution, whose scatter gives the standard error.
+    A window is the part of both lines that is in the Hertzian contact at one instant. The windows are equidistant in
+    time. `contact` is the length in intimate contact in each window, divided by `unit` in m. `parts` is the number of
+    equal parts of the revolution. The scatter between these parts gives the standard error.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -37,17 +37,17 @@ class Revolution:
 
     @property
     def probability(self) -> float:
-        """Fraction of the windows that have intimate contact."""
+        """Fraction of the windows in which there is intimate contact."""
         return np.count_nonzero(self.contact) / self.contact.size
 
     @property
     def length(self) -> float:
-        """Mean length in intimate contact in m."""
+        """Length in intimate contact in m, as a mean over the windows."""
         return int(self.contact.sum(dtype=np.int64)) / self.contact.size * self.unit
 
     @property
     def standard_error(self) -> float:
-        """Standard error of the probability, from the scatter among parts; NaN for a single part."""
+        """Standard error of the probability, from the scatter between the parts; NaN if there is only one part."""
         if self.parts < 2:
             return np.nan
         shares = [np.count_nonzero(part) / part.size for part in np.array_split(self.contact, self.parts)]
@@ -63,7 +63,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
         clusters = find_clusters(lines.sum(axis=0), operation.level, spacing, operation.strength)
         contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width, case.edge_rule)
     else:
-        # finer grids have more windows; the change between two grids thus contains the error of the window positions
+        # a finer grid has more windows, so that the change between two grids includes the error of the window spacing
         stride = max(1, int(operation.width / operation.length * operation.source.points[0] / WINDOWS))
         contact = _windows(operation, lines, np.arange(0, points, stride))
     parts = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
@@ -71,7 +71,10 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the length in intimate contact at given positions of the contact, in spacings between points."""
+    """Return the length in intimate contact, as in `Revolution.contact`, after each distance in `travels`.
+
+    The distances are in spacings between points.
+    """
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)
@@ -81,8 +84,8 @@ def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> Int
 def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> dict[str, float]:
     """Return the scalar outputs of a realisation and their errors.
 
-    `errors` are the errors of the probability and of the length in m. Conductance and resistance apply to the whole
-    width of the rollers, which consists of squares that conduct in parallel.
+    `errors` contains the error of the probability and the error of the length in m. Conductance and resistance are
+    those of all independent squares across the rollers, which conduct in parallel.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()
@@ -104,7 +107,7 @@ def drawn(
 ) -> dict[str, FloatArray]:
     """Return the requested outputs that are arrays: the trace of the contact length, and the profiles.
 
-    The profiles are both surfaces around the contact, at the moment with the largest length in intimate contact.
+    The profiles show both surfaces around the contact at the time when the length in intimate contact is largest.
     """
     case, points, found = operation.case, lines.shape[1], {}
     if "contact_length_trace" in wanted:

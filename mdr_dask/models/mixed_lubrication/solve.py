@@ -18,9 +18,9 @@ from mdr_dask.models.mixed_lubrication.revolution import Revolution, drawn, revo
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.refine import Solution, refine
 
-#: At lower film ratios, overlapping asperities merge into large clusters that do not break the layer.
+#: Lowest film ratio without a warning. Below it, asperities merge into large clusters that do not break the layer.
 LEAST_FILM_RATIO = 0.5
-#: Outputs that follow from the length in intimate contact, and all outputs that need the rough lines.
+#: `_OF_LENGTH`: outputs that follow from the length in intimate contact. `_OF_LINES`: outputs that need rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
 #: Outputs that can be zero, each with a floor. If an output is smaller than its floor, its relative error is the error
@@ -75,7 +75,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
-    """Write the requested values to the result."""
+    """Write those of the values `found` that are requested to the result."""
     for name in found.keys() & set(block.outputs):
         result.values[name][index, position] = found[name]
 

@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `sliding_friction`; quick to import."""
+"""Parameters and outputs of the model `sliding_friction`. This module does not import the solver."""
 
 from __future__ import annotations
 
@@ -24,18 +24,22 @@ class SlidingFriction(SlidingBody):
     )
     scheme: Literal["hermite", "backward_euler"] = Field(
         default="hermite",
-        description="integration of the deformation along the line. hermite: exact for cubic polynomials between the "
-        "grid points. backward_euler: the time steps of the original papers, for a Kelvin body only",
+        description="method that integrates the deformation along the line. hermite: exact for cubic polynomials "
+        "between the grid points. backward_euler: the time steps of the original papers, for a Kelvin body only",
     )
 
 
 OUTPUTS = (
     Output("friction_coefficient", "1", "coefficient of friction", has_error=True),
-    Output("indentation_depth", "m", "penetration of the mean line of the roughness", has_error=True, comment=NO_GAP),
+    Output(
+        "indentation_depth", "m", "indentation depth of the mean line of the roughness", has_error=True, comment=NO_GAP
+    ),
     Output("contact_fraction", "1", "fraction of the line that is in contact", has_error=True, comment=NO_AREA),
     Output("contact_slope", "1", "rms slope of the line inside the contact", has_error=True),
     Output("rms_slope", "1", "rms slope of the whole line"),
-    Output("material_error", "1", "rms relative error of the fitted Prony series; 0 if none was fitted", (), False),
+    Output(
+        "material_error", "1", "rms relative error of the fitted Prony series; 0 if no series was fitted", (), False
+    ),
 )
 
 SOLVE = "mdr_dask.models.sliding_friction.solve"

@@ -20,9 +20,10 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# grid points per point of the line on the finest grid that is usually needed: for a plane Kelvin body, and for others
+# grid points per point of the line on the finest grid that is usually needed: first for plane Kelvin bodies, then for
+# all other bodies
 USUAL_ON_PLANES, USUAL = 2, 16
-BYTES_A_NODE = 150  # peak memory per grid point in bytes, for a line and one case on it; measured: 20 to 130 bytes
+BYTES_A_NODE = 150  # peak memory in bytes per grid point, for a line and one case; 20 to 130 bytes were measured
 OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line
 
 #: Outputs that have errors, each with the corresponding column of `Steady`.
@@ -53,7 +54,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield groups of cases with equal setting, oversampling and scheme: setting, one case, indices of all cases."""
+    """Yield, for each group of cases with equal setting and grid: the setting, one case, the indices of all cases."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
@@ -79,7 +80,7 @@ class _Group:
         self.request = Request(accuracy, case.oversampling, case.scheme, with_errors, contact)
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Write the results of the realisation with index r in the block; return the number of solved cases."""
+        """Solve realisation number r of the block and write its results; return the number of solved cases."""
         roughness = self.setting.roughness
         if r and not roughness.is_random:
             self._repeat(result, r)
@@ -104,7 +105,7 @@ class _Group:
         return int(self.loads.size)
 
     def _repeat(self, result: Result, r: int) -> None:
-        """Copy the results of the first realisation to the realisation with index r, which has the same line."""
+        """Copy the results of the first realisation to realisation number r of the block, which has the same line."""
         for array in result.values.values():
             array[self.members, r] = array[self.members, 0]
         result.status[self.members, r] = result.status[self.members, 0]
@@ -147,14 +148,14 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 
 
 def operations(block: Block[SlidingFriction]) -> float:
-    """Return the approximate number of operations of a block, from the grid points of all sweeps."""
+    """Return the approximate number of operations of a block, from the number of grid points in all sweeps."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # computing a line costs about ten sweeps; a sweep of a case counts half, because most of its sweeps are on
-        # coarser grids
+        # computing a line costs as much as about ten sweeps; the sweeps of a case count half, because most of them are
+        # on coarser grids
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e5 + OPERATIONS_A_NODE * nodes
 

@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `velocity_jump`; quick to import."""
+"""Parameters and outputs of the model `velocity_jump`. This module does not import the solver."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class VelocityJump(SlidingBody):
         multiple_of=2,
     )
     steps_per_decade: int = quantity(
-        "1", "time steps in each decade of time; use 8 or more for large jumps", default=8, ge=4, le=400
+        "1", "number of time steps in each decade of time; use 8 or more for large jumps", default=8, ge=4, le=400
     )
     velocity_change: float = quantity(
         "1", "relative change of the velocity at the jump, (v_2 - v_1) / v_1", default=0.2, gt=-1
@@ -67,12 +67,12 @@ class VelocityJump(SlidingBody):
         return self
 
     def largest_force(self) -> float:
-        """Return the largest normal force of the history in N."""
+        """Return the largest normal force in N before the jump and during the history."""
         (_, before), history = pieces(self.protocol, self.velocity, self.normal_force, self.velocity_change)
         return max(before, *(max(piece.force) + piece.swing[1] for piece in history))
 
     def solid(self) -> LinearSolid:
-        """Return the solid of the body."""
+        """Return the viscoelastic solid of which the body consists."""
         from mdr_dask.physics.solids import kelvin
 
         if self.material is not None:
@@ -82,7 +82,7 @@ class VelocityJump(SlidingBody):
         return kelvin(self.shear_modulus, self.relaxation_time)
 
     def time_unit(self) -> float:
-        """Return tau in s, the unit of stored times: the longest relaxation time of Prony terms and dashpot."""
+        """Return tau in s, the unit of stored times: the longest relaxation time of the Prony terms and the dashpot."""
         solid = self.solid()
         return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 
@@ -99,7 +99,7 @@ OUTPUTS = (
     Output(
         "indentation_depth",
         "m",
-        "penetration of the mean line of the roughness",
+        "indentation depth of the mean line of the roughness",
         ("relaxation_times",),
         False,
         True,

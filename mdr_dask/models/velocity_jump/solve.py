@@ -91,7 +91,7 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
-    """Yield groups of cases. Jumps of a plane Kelvin body with the same line and grid form a group.
+    """Yield groups of cases. Jumps of a plane Kelvin body form a group if they have the same line and grid.
 
     Every other case is a group by itself.
     """
@@ -132,7 +132,7 @@ class _Group:
         raise NotImplementedError
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Write the results of the realisation with index r in the block; return the number of solved cases."""
+        """Solve realisation number r of the block and write its results; return the number of solved cases."""
         members = self.members
         height, length = self.problems.height[members], self.problems.length[members]
         try:
@@ -161,7 +161,7 @@ class _Group:
         """Yield messages about failures, outputs that miss the accuracy, and cases outside the tested range."""
         for k in np.flatnonzero(found.outcome != Outcome.CONVERGED):
             outcome = Outcome(int(found.outcome[k]))
-            more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
+            more = ": use fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
             yield int(k), outcome.sentence + more
         # the accuracy of a transient is checked only if the campaign gives an accuracy
         judged = [name for name in self.outputs if self.block.accuracy is not None or name not in TRANSIENT]
@@ -174,7 +174,7 @@ class _Group:
         """Return the floor of an output for every case (see `missed_accuracy`).
 
         The floor of a depth is the rms height, which is the unit of the depths here. If friction is zero within its
-        error, as for a body at rest, the floor is the largest friction of the case. In all other cases the floor is 0.
+        error, as for a body at rest, the floor is the largest absolute friction of the case. Otherwise it is 0.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -188,7 +188,7 @@ class _Group:
 
 
 class _Marched(_Group):
-    """Jumps of a Kelvin body on one line; equal jumps are solved once."""
+    """Jumps of a plane Kelvin body on one line. Equal jumps are solved only once."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the different cases together."""
@@ -212,9 +212,10 @@ class _Marched(_Group):
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Loads and Deborah numbers of the different cases, and for every case the index of its numbers among them.
+        """Loads and Deborah numbers of the different cases, and the index of every case among the different cases.
 
-        They are sorted by velocity, because the solver shares work among neighbours with equal Deborah numbers.
+        The different cases are sorted by velocity, because the solver shares work between neighbours with equal
+        Deborah numbers.
         """
         before = self.problems.deborah[self.members]
         change = self.block.numbers("velocity_change")[self.members]
@@ -227,7 +228,7 @@ class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case with a quarter, half and all of the nodes. The time step is proportional to their spacing."""
+        """Solve the case on a quarter, half and all of the nodes. The time step is proportional to the node spacing."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
@@ -254,7 +255,7 @@ class _Followed(_Group):
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a grid that is coarser by the factor `every`: it keeps one node out of `every` nodes."""
+        """Compute the case on a coarser grid. With every = 4, for example, the grid consists of each fourth node."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
@@ -287,7 +288,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def operations(block: Block[VelocityJump]) -> float:
-    """Return the approximate number of operations of a block, estimated from the nodes of its cases."""
+    """Return the approximate number of operations of a block, estimated from the number of nodes in its cases."""
     total = 1e6
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
