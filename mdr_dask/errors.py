@@ -95,7 +95,9 @@ def did_you_mean(word: Any, known: Sequence[str]) -> str:
 
 
 def similar(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, after a space, with the nearest known word; empty if no word is near."""
+    """Return a hint with the nearest known word, such as `` (did you mean 'hurst'?)``, or an empty text if no word is
+    near.
+    """
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

@@ -84,7 +84,7 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes on the parameters of the series, also with one of them replaced by a value of an axis."""
+        """Notes on the parameters of the series, and on some values of every axis."""
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -296,7 +296,7 @@ def available_memory() -> float:
 
     limits = [psutil.virtual_memory().total]
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
-        with suppress(OSError, ValueError):  # there is no such file, or it states no limit
+        with suppress(OSError, ValueError):  # raised if the file does not exist or states no limit
             limits.append(int(Path(path).read_text()))
     return float(min(limits))
 
@@ -350,9 +350,10 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
 
 
 def _part(template: Template, dim: str, most: int) -> int:
-    """Cut a dimension into nearly equal parts that are at most `most` long, and return their length.
+    """Return the length of the parts if a dimension is cut into nearly equal parts of at most `most` values.
 
-    If rounds add realisations, the length along ``realisation`` divides the number of realisations of the first round.
+    If rounds add realisations, the length along ``realisation`` is a divisor of the number of realisations in the first
+    round: with 12 realisations and ``most = 5``, the length is 4.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication

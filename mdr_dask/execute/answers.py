@@ -28,7 +28,8 @@ def cases_that_narrow(
     """Return the cases that need more realisations, because they affect a constant whose interval is too wide.
 
     As long as every case has fewer than `FEWEST` realisations, all new cases of the stage need more. `places` are the
-    positions in the store of the cases of the stage; `taken` has the number of realisations of each case that are used.
+    positions that the cases of the stage have in the store. `taken` contains, for each case, the number of realisations
+    from which the constants are computed.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -77,11 +78,13 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the results of every series; failed realisations, and those beyond the number in `taken`, become NaN."""
+    """Return the results of every series. If `taken` is 10 for a case, realisations 11, 12, ... of this case become
+    NaN. Failed realisations become NaN, too.
+    """
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # the group at the root may have another name
+        data = opened[name if name in opened else next(iter(opened))]  # the store may use another name for the root
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}

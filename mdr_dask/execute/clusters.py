@@ -65,7 +65,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        # needed if the workers of a client that the user gives are threads of this process
+        # needed if the user gives a client whose workers are threads of this process
         stack.enter_context(one_blas_thread())
         most: int = 0
         replace_lost: Callable[[], None] | None = None
@@ -145,7 +145,7 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
         try:
             yield cluster
         finally:
-            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # if no worker was ever started
+            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # raised if no worker was started
                 cluster.close()
 
 
@@ -162,7 +162,7 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add arguments that keep other users out of a cluster: TLS, and a web page that only this machine can open."""
+    """Add arguments that protect a cluster from other users: TLS, and a web page that only this machine can open."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD

@@ -49,7 +49,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.__exit__(*reason)
 
     def apart(self) -> None:
-        """Compute all blocks in child processes, because a case may be the cause of a crash of the last run."""
+        """Compute all blocks in child processes, because a case may have crashed the last run."""
         if hasattr(os, "fork") and not self._resources.remote and not self._is_apart:
             self._is_apart = True
             sentence = "the last run was killed or crashed: blocks are computed in child processes, to find the cause"
@@ -78,10 +78,11 @@ class Executor(AbstractContextManager["Executor"]):
                 self._in_pool(works, settle)
 
     def _in_pool(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks in threads. After an error, the blocks that have started are still finished.
+        """Compute blocks in threads. After an error or an interrupt, wait until the blocks that have started are
+        finished.
 
-        A second interrupt ends this wait. The pool is not used in a ``with`` statement, because its end would wait
-        again.
+        A second interrupt ends this wait. The pool is not used in a ``with`` statement, because the end of the
+        statement would then wait once more.
         """
         pool = ThreadPoolExecutor(self._threads)
         remaining = iter(works)

@@ -82,8 +82,8 @@ def run(
 
         require_known(campaign)
     stage = Stage.first(campaign)
-    stored_layout(stage, url)  # raises an error before anything is locked
-    url = store.absolute(url)  # because a model may change the working directory
+    stored_layout(stage, url)  # if this raises an error, nothing has been locked yet
+    url = store.absolute(url)  # a model may change the working directory later
     with Executor(resources, campaign.model, tell) as execute:
         if not store.exists(url):
             execute.connect()  # if this fails, no store is created
@@ -114,8 +114,8 @@ def _merge(job: _Job) -> None:
 def outlook(campaign: Campaign, url: str) -> Progress:
     """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
 
-    Only the first round of each stage is counted. For adaptive axes, all values are counted that are already known to
-    be needed. If outputs have tolerances for their standard errors, only the first values of these axes are counted.
+    Only the first round of each stage is counted. For adaptive axes, all values that are already known to be needed are
+    counted. If outputs have tolerances for their standard errors, only the values of the first stage are counted.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -226,7 +226,7 @@ def _without_answers(job: _Job) -> _Job:
 
 
 def _next(job: _Job, last: _Round | None) -> _Round:
-    """Return the next round. If a case needs more realisations, extend the store; other parts wait meanwhile."""
+    """Return the next round, and extend the store if a case needs more realisations. Meanwhile, other parts wait."""
     replication = job.stage.campaign.replication
     with store.gate(job.url):
         layout, places = stored_layout(job.stage, job.url)
@@ -297,7 +297,7 @@ def _require_seen(job: _Job, current: _Round) -> None:
     lost = sum(cells.new for cells in _find(replace(job, retry_failed=False), current))
     if lost:
         where = "workers need a shared file system or a URL"
-        raise StoreError(f"{job.url}: {lost} results that were computed are not found from here; {where}")
+        raise StoreError(f"{job.url}: {lost} results that were computed cannot be found from this machine; {where}")
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:

@@ -21,7 +21,7 @@ Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout of the store with the new cases of a stage, and the positions in it of all its cases."""
+    """Return the layout that the store needs for a stage, and the positions that its cases have in this layout."""
     campaign = stage.campaign
     if not store.exists(url):
         layout = templates(campaign, campaign.replication.at_least)

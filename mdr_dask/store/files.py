@@ -163,7 +163,7 @@ def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages: each file is replaced in one step, after all files of the earlier stages.
 
     On a disk, all files are first written under temporary names and flushed. Then the files of the earlier stages get
-    their final names. Only when these names are flushed do the files of the last stage get theirs.
+    their final names, and these names are flushed. After that, the files of the last stage get their final names.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -333,7 +333,7 @@ def group_name(series: str, member: str = "") -> str:
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block; `further` is the number of dimensions that the ledger lacks."""
+    """Return the name of the chunk of a block; `array` has `further` more dimensions than the ledger."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 

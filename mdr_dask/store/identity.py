@@ -152,7 +152,7 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
     ]
     lacking = [name for name in outputs if name not in held["outputs"]]
     if lacking:
-        found.append(f"outputs: the store lacks {', '.join(lacking)}, for which every case would be computed again")
+        found.append(f"outputs: the store lacks {', '.join(lacking)}; every case would have to be computed again")
     before = _leaves(json.loads(held["parameters"]), "")
     now = _leaves(series.parameters.model_dump(mode="json"), "")
     varied = tuple(f"{axis}." for axis in axes.keys() | held_axes.keys())
@@ -205,10 +205,10 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of each entry of a dimension; an entry has one value of every axis of the dimension.
+    """Return the position of each entry of a dimension. An entry consists of one value of every axis of the dimension.
 
-    The key of an entry is the text of its values, and the number of equal entries before it. Values that agree to
-    `SAME_DIGITS` digits count as equal. Entries may be equal if whole numbers are sampled.
+    Each key has two parts: the values of the entry as text, and the number of equal entries before it. Entries can be
+    equal, for example if whole numbers are sampled. Values that agree to `SAME_DIGITS` digits count as equal.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()

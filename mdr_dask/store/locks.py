@@ -365,7 +365,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Remove the runner files of a lock, each when no task of its run is writing any more."""
+    """Remove the runner files of a lock. Before a file is removed, wait until no task of its run is writing."""
     give_up = time.monotonic() + SILENCE
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:

@@ -35,7 +35,7 @@ def verify_packed(path: Path) -> Inspection:
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
             expected = _checksums(path, packed)
-            packed.extractall(folder)  # writes only into the folder, whatever the names
+            packed.extractall(folder)  # `extractall` never writes outside the folder, even if a file name contains ".."
             findings = list(_compare(folder, expected))
             try:
                 inspected = verify(folder)
