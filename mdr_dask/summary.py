@@ -1,4 +1,4 @@
-"""Describe, before a campaign is run, its results and its costs, as text and as JSON, for ``mdr-dask check``."""
+"""Describe the results and the costs of a campaign before it is run, as text and as JSON, for ``mdr-dask check``."""
 
 from __future__ import annotations
 

@@ -100,9 +100,10 @@ class TableError(DataError):
 class Sheet:
     """A table as text.
 
-    `cells` has the shape (rows, columns), and its numbers have decimal points. `lines` contains the line of each row.
-    `names` and `units` are as written, and empty if the table lacks them. `head` is the line of names, or the first row
-    of numbers if there are no names. `notes` are the first cells of the lines of text below the numbers.
+    `cells` has the shape (rows, columns), and its numbers have decimal points. `lines` contains the line from which
+    each row was read. `names` and `units` are as written, and empty if the table lacks them. `head` is the line of
+    names, or the first row of numbers if there are no names. `notes` are the first cells of the lines of text below the
+    numbers.
     """
 
     source: str
@@ -333,9 +334,9 @@ class _Head(NamedTuple):
 def _head(grid: _Grid) -> _Head:
     """Find the names and units in the lines of text above the numbers.
 
-    Only lines with as many cells as most lines of numbers count. If there is none, the last line above contains the
-    names. If a line of units follows the names, the names are in the line above the last line of units. Otherwise the
-    names are in the last line, and the units may be in the line above it.
+    Only lines with as many cells as most lines of numbers are considered; if there is no such line, the last line above
+    the numbers contains the names. If a line of units stands below one of the considered lines, the names are in the
+    line above the units. Otherwise the names are in the last line, and the units may be in the line above it.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -362,7 +363,7 @@ def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     A column is numeric if it contains numbers in at least half of the lines of the most frequent length. A line
     contains numbers if at least half of its filled cells in these columns are numbers or marks of missing numbers. A
     line that begins with a word is text if the word is in a numeric column, or if less than half of the columns are
-    filled. In a line that is shorter than most lines, exactly half is too few as well.
+    filled. If such a line is shorter than most lines, it is text even if exactly half of the columns are filled.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # every line has more words than numbers
@@ -529,9 +530,9 @@ def _are_units(row: Sequence[str]) -> bool:
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
     """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
 
-    The meaning is one of `columns`, or None. In a table without names, the meanings are `columns` in this order. A
-    needed column that has none of the known names is recognised by its dimension, if only one unknown column of the
-    table and only one of `columns` have this dimension.
+    The meaning is one of `columns`, or None. In a table without names, the meanings are `columns` in this order. If the
+    table has none of the names of a needed column, the column is recognised by its dimension. This requires that only
+    one unknown column of the table, and only one of `columns`, has this dimension.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -634,7 +635,7 @@ def _unit(written: str, column: Column) -> str:
 def _values(
     sheet: Sheet, place: int, column: Column, unit: str, is_logarithm: bool, allow_missing: bool
 ) -> tuple[FloatArray, list[Problem]]:
-    """Return the values of a column in SI, and a list with the first problem of its entries, if there is one."""
+    """Return the values of a column in SI, and a list of its first problem (empty if there is no problem)."""
     values, wrong = np.full(len(sheet.cells), np.nan), []
     before, factor, zero = factors(unit, column.unit)
 

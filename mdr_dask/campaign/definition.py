@@ -70,7 +70,7 @@ class Axis:
     path: str
     # Name of its coordinate in the store: the path with ``_`` for ``.``.
     name: str
-    # Its dimension in the store: `name` in a grid, ``case`` if parameters vary together.
+    # Its dimension in the store. In a grid this is `name`; if parameters vary together, it is ``case``.
     dim: str
     # Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     values: tuple[Any, ...]

@@ -18,7 +18,7 @@ from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
-_DEEPEST = 50  # largest number of nesting levels; no campaign has more than ten, and Python can read about 1000
+_DEEPEST = 50  # largest number of nesting levels; a campaign has at most ten, and Python fails at about 1000
 _LARGEST = 200_000  # largest number of values in a file; with YAML aliases, a short text can stand for billions
 _LONGEST = 300_000  # largest number of characters in a file; reading so many takes about a second
 _TOO_DEEP = "too deeply nested, too many values, or an alias that contains itself"
@@ -127,7 +127,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last line and the line above differ in indentation although no colon ends the line above."""
+    """Return whether the last two lines differ in indentation although the first of them does not end with a colon."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -136,7 +136,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Raised to stop reading a document that is too large or contains itself, after this problem was reported."""
+    """Raised after a problem was reported, to stop reading a document that is too large or has an endless alias."""
 
 
 class _Reader:

@@ -187,7 +187,7 @@ class _Expansion:
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
     ) -> list[list[Any] | None]:
-        """Return, for each varied parameter, its checked values in all cases. If a case is wrong, return ``[None]``."""
+        """Return, for each varied parameter, its checked values in all cases; ``[None]`` if any value is wrong."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         are_independent = all(fields.is_independent(self.parameters, one.path, self.data) for one in variations)
         cases = list(zip(*(one.items for one in variations), strict=False))
@@ -268,7 +268,7 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return the data in which every parameter that is not in `varied` has its checked value from `base`."""
+    """Return the data, with the checked values of `base` for all parameters that are not in `varied`."""
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

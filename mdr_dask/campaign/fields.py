@@ -57,8 +57,8 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, return the set that has most of the keys of the mapping. If several sets have equally
-    many of them, return the set with most keys of a similar name.
+    If several sets fit, return the set that contains most keys of the mapping. If this does not decide, return the set
+    for which most keys of the mapping resemble the name of a field.
     """
     if not isinstance(value, dict):
         return None

@@ -45,7 +45,7 @@ def _written(key: str, value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value in a form that JSON can hold."""
+    """Return a value in a form that JSON can represent."""
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple | range):

@@ -38,7 +38,7 @@ class Measured:
     """Measured points in SI; each array has the shape (points,).
 
     `errors` are standard errors of the values, and `error_column` the name of their column. The keys of `conditions`
-    are coordinates of the store. `remark` names unused columns and counts rows that lack a number.
+    are names of coordinates of the store. `remark` names unused columns and counts rows that lack a number.
     """
 
     source: str
@@ -60,9 +60,9 @@ def read_measured(
 ) -> Measured:
     """Read a table of measured points. `conditions` and `outputs` map names of possible columns to their SI units.
 
-    A heading may be the last words of a name: ``temperature`` means ``solid_temperature``, if all other names that end
-    in ``temperature`` have more words. A DataError is raised if the numbers of an unused column lie within the range of
-    an axis that has no column, because this axis would then be taken as an unknown.
+    A heading may be short for a name: ``temperature`` means ``solid_temperature``, if every other name that ends in
+    ``temperature`` has more words. An axis without a column is an unknown. DataError is raised if the numbers of an
+    unused column lie within the range of such an axis, because the column may be meant for this axis.
     """
     sheet = read_sheet(text, source)
     short = _short_names([*conditions, *outputs])
@@ -128,8 +128,8 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return the short forms of each name, such as ``temperature`` for ``solid_temperature``.
 
-    A short form consists of the last words of a name. It belongs to a name if all other names that end in these words
-    are longer.
+    A short form consists of the last words of a name. If several names end in these words, it belongs to the name with
+    the fewest words, or to none if two names have equally few.
     """
     words = [tuple(name.split("_")) for name in names]
     found: dict[str, tuple[str, ...]] = {"_".join(each): () for each in words}

@@ -36,7 +36,7 @@ _KINDS = {
 
 
 def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
-    """Report every error of ``kind.model_validate(data)``; the errors of all types of a union become one message."""
+    """Report every error of ``kind.model_validate(data)``; all errors of the same value become one message."""
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
         if _is_of_another_branch(details, kind, data):
@@ -112,7 +112,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """Return the path from a list to the entry that a message quotes; the path is empty if no entry is quoted."""
+    """If a message quotes an entry of a list, return the path from the list to this entry, otherwise an empty path."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 
@@ -142,7 +142,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint for a word in place of a mapping or a list: how to write this mapping or list."""
+    """If a word was given instead of a mapping or a list, return a hint that shows how to write the mapping or list."""
     value, info = value_at(data, path), fields.field_at(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -223,7 +223,7 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a description of a quantity that contains a usual value. The text is empty for a field without a unit."""
+    """Describe the quantity that a field expects, with a usual value. The text is empty for a field without a unit."""
     info, unit = fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     return expected(unit, "".join(fields.usual(info)[:1])) if info and unit else ""
 

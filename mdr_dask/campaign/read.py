@@ -104,7 +104,8 @@ def _model(document: Document, spec: CampaignSpec) -> Model[Any] | None:
 def with_hint(error: ModelError, name: str) -> str:
     """Return the message about a model that cannot be loaded.
 
-    The message ends with a hint: the known model with the nearest name, or the page of the documentation on own models.
+    The message ends with a hint: the known model with the nearest name, or the page of the documentation about models
+    that users write.
     """
     is_unknown = str(error).startswith("unknown")
     return f"{error}{did_you_mean(name, models.names()) if is_unknown else ' (see docs/own-model.md)'}"

@@ -85,7 +85,7 @@ def find(
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
     `paths` contains the path in the document of each parameter in `data`. If `drawn` is true, values are drawn from the
-    ranges, so that a range is written without a number of values. A parameter with a problem is returned without
+    ranges, and a range does not state a number of values. A parameter whose list or range is wrong is returned without
     values.
     """
     search = _Search(document, parameters, data, drawn)

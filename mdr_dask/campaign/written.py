@@ -42,8 +42,8 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter with a number that has no unit and is perhaps not meant in SI.
 
-    `paths` contains the path in the document of each parameter in `data`. `units` contains the units that differ from
-    the units declared in the model, by dotted name.
+    `paths` contains the path in the document of each parameter in `data`. `units` maps the dotted name of a parameter
+    to its unit if this is not the unit that the model declares.
     """
     asked: set[Path] = set()
     for name, given in data.items():
@@ -68,9 +68,9 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """Yield the parameter, the path and the value of every number and text.
+    """For every number and text, yield the path of its parameter, its own path, and its value.
 
-    The entries of a list and the ends of a range have the parameter to which the list or range belongs.
+    The entries of a list and the ends of a range belong to the parameter that has this list or range.
     """
     if isinstance(value, dict):
         for key, inner in value.items():

@@ -62,7 +62,7 @@ def write_answer(answer: Table, path: Path) -> int:
 def check_target(path: Path) -> None:
     """Raise an error if a table cannot be written to a path.
 
-    The suffix may be unknown, the path may be the store of a study, or pyarrow may be missing.
+    Possible reasons: the suffix is unknown, the path is the store of a study, or pyarrow is missing.
     """
     from mdr_dask.store import is_study
 
@@ -106,7 +106,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 
 
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
-    """Join each mean and its errors, ``0.1234 +- 0.0005``, or its interval, ``0.1234 (0.1220, 0.1240)``, in one column.
+    """Join each mean with its errors (``0.1234 +- 0.0005``) or its interval (``0.1234 (0.1220, 0.1240)``).
 
     An error is left out if it is unknown in all rows. The returned text names the errors that are printed.
     """
@@ -133,7 +133,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return a text that names the printed errors: once if it is true for all outputs, otherwise for each output."""
+    """Return a text that names the printed errors: once for all outputs if possible, otherwise for each output."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""

@@ -156,7 +156,7 @@ def _is_text(column: Sequence[str]) -> bool:
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts. If they need several lines, the second text is wrapped below its first character."""
+    """Join two texts. If they need several lines, all lines of the second text begin in the same column."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()

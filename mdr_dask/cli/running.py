@@ -112,7 +112,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return the name of the counted results, such as ``first round``, or an empty text if all results are counted."""
+    """Return which results are counted, such as ``first round``; the text is empty if all results are counted."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)

@@ -131,7 +131,8 @@ def _option(name: str) -> str:
 def _kind(file: str, options: dict[str, Any]) -> str:
     """Return the kind of a file: a spectrum, a map or a scan.
 
-    The names of the columns show whether it is a spectrum. A map has two dimensions, or an option that only maps have.
+    The names of the columns show whether a file is a spectrum. A file is a map if it has two dimensions, or if an
+    option is given that only maps have.
     """
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
