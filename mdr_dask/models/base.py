@@ -147,13 +147,16 @@ CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Return dimensionless numbers, rounded so that numbers which differ only by rounding errors become equal."""
+    """Round dimensionless numbers, so that numbers with slightly different rounding errors become equal."""
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
 
 def deferred(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that imports `name` from `module` only when it is called, so that declarations load quickly."""
+    """Return a function that imports and calls the function `name` of `module`.
+
+    `module` is imported only at the first call, so that declarations load quickly.
+    """
 
     def call(*arguments: Any) -> Any:
         return getattr(import_module(module), name)(*arguments)
@@ -169,8 +172,8 @@ class Output:
     """One array that a model can compute.
 
     * `unit` and `long_name`: SI unit (``"1"`` for a pure number) and meaning of the output.
-    * `dims`: dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives their
-    values.
+    * `dims`: dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives
+    the coordinates of these dimensions.
     * `default`: whether the output is computed if the campaign names no outputs.
     * `has_error`: whether the solver estimates the discretisation error. The error is stored as the companion `error`,
     unless the campaign has ``errors: false``.
@@ -203,7 +206,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Number:
-    """A dimensionless number that is computed for each case, for tables and conditions.
+    """A dimensionless number that is computed for each case. Users can write its name in tables and conditions.
 
     The module `mdr_dask.questions.expression` evaluates `formula`. The formula may contain outputs, other numbers and
     parameters. A nested parameter has its path as name, joined by ``_``, such as ``indenter_angle``.
@@ -225,12 +228,12 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Block(Generic[P]):
-    """Some cases, in the same realisations. One Dask task computes them and writes one chunk of every array.
+    """Several cases, each with the same realisations. One Dask task computes them and writes one chunk of every array.
 
-    * `parameters`: a parameter set with the values of the fixed parameters. A varied parameter has in it
-    the value of an arbitrary case; `column` returns the values for all cases.
-    * `columns`: the varied parameters by dotted path (such as ``velocity`` or ``indenter.angle``), one value for each
-    case in SI units.
+    * `parameters`: a parameter set with the values of the fixed parameters. Its values of varied parameters are those
+    of an arbitrary case; `column` returns the values for all cases.
+    * `columns`: for the dotted path of each varied parameter (such as ``velocity`` or ``indenter.angle``), an array
+    with one value in SI units for each case.
     * `realisations`: indices of the realisations. An index and `seed` determine all random numbers of a
     realisation.
     * `outputs`: names of the arrays to compute, including the companions that hold errors.
@@ -317,14 +320,13 @@ class Model(Generic[P]):
     * `compute`: a pure function. The value of a case depends on its parameters, the seed and its realisation, but not
     on the other cases of the block. The function raises no exception for a case that fails.
     * `operations`: approximate number of floating-point operations of a block, from which block sizes are chosen. The
-    function must be fast. If it is None, a study with n results is divided into about sqrt(n) blocks.
+    function must be fast. If `operations` is None, a study with n results is divided into about sqrt(n) blocks.
     * `whole`: parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
     becomes too large, the axis of the last of these parameters is divided first.
     * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
     * `distinct`: number of different solutions among the cases of a block, for ``check``; by default the number of
     cases.
-    * `units`: units that differ from the declared ones, by the name of the output or parameter. A dimensionless
-    campaign has such units.
+    * `units`: the unit of each output or parameter that is not in its declared unit, as in a dimensionless campaign.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
     * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets of the study, in
     which one axis at a time is varied. A nested parameter set can have its own method `notes`.

@@ -92,7 +92,8 @@ NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_ty
 class NamedByFile(Parameters):
     """A parameter set with a field `file` or `files`.
 
-    A user may write only the name of the file instead of the set. The other fields then have their default values.
+    In place of the whole parameter set, a user may write only the name of the file. The other fields then have their
+    default values.
     """
 
     model_config = ConfigDict(json_schema_extra={"bare_name": True})

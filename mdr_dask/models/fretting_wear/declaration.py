@@ -212,7 +212,7 @@ class FrettingWear(Parameters):
         if self.stick_radius is not None and given:
             raise ValueError(
                 f"expected stick_radius or quantities with units, got stick_radius and {', '.join(given)}; leave "
-                "one kind out"
+                "out stick_radius or all the others"
             )
         if not self.dimensionless:
             self._check_dimensional()

@@ -48,8 +48,8 @@ class Numbers:
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     """Return a list of indenters: one for every case, or a single one for all cases.
 
-    Cases whose indenters are power laws of one shape, such as cones with different angles, share one element
-    of the list.
+    The list has a single element if all cases have the same indenter, or if only its numbers differ and it is a power
+    law, as for cones with different angles.
     """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]

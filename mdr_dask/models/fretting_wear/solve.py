@@ -65,7 +65,7 @@ class Task:
 
     @property
     def profile(self) -> Profile:
-        """The virgin body."""
+        """The profile of the body before wear."""
         return PowerProfile(self.exponent) if self.table is None else table_profile(self.table, self.depth)
 
 
@@ -109,7 +109,7 @@ def operations(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the number of operations that one evolution and its errors need, without the evaluation at each N."""
+    """Return the operations of one solution of the wear equation and its errors, without the evaluation at each N."""
     if hold == "force":
         return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 1.2e7 * float((_USUAL / accuracy) ** 0.6)

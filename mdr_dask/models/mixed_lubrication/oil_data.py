@@ -69,7 +69,7 @@ class OilData(Parameters):
     @model_validator(mode="after")
     def _is_an_oil(self, info: ValidationInfo) -> OilData:
         self.require_one_alternative()
-        if self.viscosities is None or info.context is not None:  # a table is read only in a campaign
+        if self.viscosities is None or info.context is not None:  # outside a campaign, the table is not read
             try:
                 T1, nu1, T2, nu2 = self.two_viscosities
                 walther_constants((T1, T2), (nu1, nu2))
@@ -79,7 +79,10 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by its kinematic viscosity in m^2/s: given, or fitted to the table."""
+        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s at this temperature.
+
+        The user gives them, or they are computed by the law that is fitted to the table.
+        """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])

@@ -27,8 +27,8 @@ class Revolution:
     """Intimate contact during one revolution of the rollers.
 
     A window is the part of both lines that is in the Hertzian contact at one instant. The windows are equidistant in
-    time. `contact` is the length in intimate contact in each window, divided by `unit` in m. `parts` is the number of
-    equal parts of the revolution. The scatter between these parts gives the standard error.
+    time. `contact` times `unit` is the length in m that is in intimate contact in each window. `parts` is the number of
+    equal parts into which the revolution is divided. The scatter between these parts gives the standard error.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -71,9 +71,9 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the length in intimate contact, as in `Revolution.contact`, after each distance in `travels`.
+    """Return the length in intimate contact, as in `Revolution.contact`, after each travelled distance in `travels`.
 
-    The distances are in spacings between points.
+    These distances are divided by the spacing of the points.
     """
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
@@ -85,7 +85,7 @@ def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> 
     """Return the scalar outputs of a realisation and their errors.
 
     `errors` contains the error of the probability and the error of the length in m. Conductance and resistance are
-    those of all independent squares across the rollers, which conduct in parallel.
+    those of all independent squares across the rollers together; the squares conduct in parallel.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()

@@ -35,7 +35,8 @@ _ORDER = 1
 def compute(block: Block[MixedLubrication]) -> Result:
     """Solve the cases of a block; one realisation is one revolution of the rollers with random lines.
 
-    In each realisation, cases that differ only in load, speed, temperature, rms height or layer use the same lines.
+    In each realisation, cases that differ only in load, speed, temperature, rms height or boundary layer have the same
+    lines.
     """
     sizes = {name: coordinate.values.size for name, coordinate in coordinates(block.parameters).items()}
     shape = (block.cases, len(block.realisations))
@@ -75,7 +76,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
-    """Write those of the values `found` that are requested to the result."""
+    """Copy the requested values from `found` to the result."""
     for name in found.keys() & set(block.outputs):
         result.values[name][index, position] = found[name]
 

@@ -21,7 +21,7 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
 class VelocityJump(SlidingBody):
-    """A viscoelastic body that slides over a rough line; its velocity jumps from v_1 to v_2, or follows a history."""
+    """A viscoelastic body that slides over a rough line. The velocity jumps from v_1 to v_2, or follows a history."""
 
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling", "steps_per_decade"})
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
@@ -67,7 +67,7 @@ class VelocityJump(SlidingBody):
         return self
 
     def largest_force(self) -> float:
-        """Return the largest normal force in N before the jump and during the history."""
+        """Return the largest normal force in N, before and after t = 0."""
         (_, before), history = pieces(self.protocol, self.velocity, self.normal_force, self.velocity_change)
         return max(before, *(max(piece.force) + piece.swing[1] for piece in history))
 

@@ -42,7 +42,8 @@ from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# operations of a jump divided by (nodes times steps per decade); operations of a history divided by nodes squared
+# The operations of a jump are OPERATIONS_MARCHED times nodes times steps per decade. The operations of a history are
+# OPERATIONS_FOLLOWED times nodes squared.
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
 HISTORY_ORDER = 2  # order at which a history converges when cell size and time step decrease together
@@ -214,7 +215,7 @@ class _Marched(_Group):
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Loads and Deborah numbers of the different cases, and the index of every case among the different cases.
 
-        The different cases are sorted by velocity, because the solver shares work between neighbours with equal
+        The different cases are sorted by Deborah number, because the solver shares work between neighbours with equal
         Deborah numbers.
         """
         before = self.problems.deborah[self.members]
