@@ -92,11 +92,11 @@ LEAST, MOST = 1e-30, 1e30
 def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any:
     """Declare a physical parameter, as in ``length: float = quantity("m", "length of the line", gt=0)``.
 
-    `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as ``"10
-    MPa"``, for ``mdr-dask init``. If a number without a unit differs from `usual` by more than three decades, ``check``
-    asks the user about it. Further values after commas, as in ``"2 GPa, 200 HV"``, show other units in which people
-    write the quantity. The other arguments, such as ``default``, ``gt`` and ``le``, are those of
-    :func:`pydantic.Field`.
+    `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as
+    ``"10 MPa"``, which ``mdr-dask init`` writes into a new campaign file. If a number without a unit differs from
+    `usual` by more than three decades, ``check`` asks the user about it. Further values after commas, as in ``"2 GPa,
+    200 HV"``, show other units in which people write the quantity. The other arguments, such as ``default``, ``gt`` and
+    ``le``, are those of :func:`pydantic.Field`.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
@@ -209,7 +209,7 @@ class Number:
     """A dimensionless number that is computed for each case. Users can write its name in tables and conditions.
 
     The module `mdr_dask.questions.expression` evaluates `formula`. The formula may contain outputs, other numbers and
-    parameters. A nested parameter has its path as name, joined by ``_``, such as ``indenter_angle``.
+    parameters. The name of a nested parameter is its path, joined by ``_``, such as ``indenter_angle``.
     """
 
     name: str

@@ -96,7 +96,7 @@ def reason(error: BaseException) -> str:
 def where(error: BaseException) -> str:
     """Return where the user's function failed, such as `` (model.py:12)``.
 
-    If another package raised the exception, the text names the line of the user's file that called this package. The
+    If another package raised the exception, the text names the line of the user's file that called that package. The
     text is empty if mdr_dask raised the exception, for example because of an invalid output.
     """
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]

@@ -31,8 +31,8 @@ class Numbers:
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
     stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
-    in sliding wear. `advance` is this number divided by the parameter `cycles` or `path`. The units `length`, `height`
-    and `force` are a0, d0 and E* d0 a0.
+    in sliding wear. `advance` is this number divided by the parameter `cycles` or `path`. `length`, `height` and
+    `force` are the units a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray

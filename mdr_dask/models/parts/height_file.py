@@ -51,7 +51,7 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights as they are in a file. The rows run along x. The steps along x and y are in the unit of the positions."""
+    """Heights in the unit of a file. The rows run along x. The steps along x and y are in the unit of the positions."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -62,9 +62,9 @@ class _Grid(NamedTuple):
 def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]:
     """Return the map in a file, and remarks on how it was read.
 
-    The file is a text, an npy file, or a file that SurfaceTopography can read. Rows of text and npy files run along x
-    and are stacked along y. In the map, missing points are NaN. `units` are the units and spacings that the user
-    states. Raise DataError if a unit or spacing is missing, or if the file and the user state different ones.
+    The file is a text, an npy file, or a file that SurfaceTopography can read. Each row of a text or npy file contains
+    the heights along x at one y. In the map, missing points are NaN. `units` are the units and spacings that the user
+    states. Raise DataError if a unit or spacing is missing, or if the user and the file contradict each other.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -84,7 +84,7 @@ def read_scan(file: DataFile, units: Units) -> Scan:
     """Return the line scan in a file. Missing heights are interpolated.
 
     The file is a table, or a file that SurfaceTopography can read. `units` are the units and the spacing that the user
-    states. Raise DataError if a unit is missing, or if the file and the user state different ones.
+    states. Raise DataError if a unit is missing, or if the user and the file contradict each other.
     """
     from mdr_dask.physics.surfaces.maps import require_few_missing
 
@@ -136,8 +136,8 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     """Return the length, in m, of the unit of the heights, and the spacings along x and y in m.
 
     The file or the user states the unit and the spacings. If only the unit of the positions is missing, it is found
-    from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. The
-    unit is always a power of ten of a metre.
+    from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. A
+    unit that is found in this way is a power of ten of a metre.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -198,7 +198,7 @@ def _channel(file: DataFile) -> Any:
     if file.name.lower().endswith(TEXT):
         try:
             file.read_text()
-        except DataError as problem:  # a binary file with an ending of text files, such as the .dat of Zygo
+        except DataError as problem:  # a binary file whose name ends like that of a text, such as .dat of Zygo
             not_text = f" ({problem})"
         else:
             return None
@@ -307,9 +307,10 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units) -> _Grid
 def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int]) -> Units:
     """Return the units and spacings that a file states before its heights.
 
-    Such a line names a quantity and ends in a unit of length. ``Height [um]`` states the unit of the heights, and
-    ``Position [mm]`` that of the positions; the first cell of a table, such as ``y [um]``, can do the same. ``Spacing:
-    2 um`` states a spacing. Gwyddion states the sides of the map instead: ``Width: 10 um`` and ``Height: 10 um``.
+    A line with a unit or a spacing names a quantity and ends in a unit of length. ``Height [um]`` states the unit of
+    the heights. ``Position [mm]``, or the first cell of a table such as ``y [um]``, states the unit of the positions.
+    ``Spacing: 2 um`` states a spacing. Gwyddion states the sides of the map instead: ``Width: 10 um`` and
+    ``Height: 10 um``.
     """
     sides = {"width": ("spacing", shape[1]), "height": ("spacing_y", shape[0])}
     corner = re.split(r"[\t;,]", first)[0]
@@ -342,7 +343,7 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, and the index of the first of these lines. Words become NaN."""
+    """Return the numeric rows of a text as a table, and the line index of the first of these rows. Words become NaN."""
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -395,7 +396,7 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return an index and a unit for each of the columns x, y and z; return no columns if one of the three is missing.
+    """Return an index and a unit for each of the columns x, y and z; return () if one of the three is missing.
 
     If the columns have no names, x, y and z are the three columns that do not hold row numbers.
     """
@@ -440,7 +441,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     """Return the positions and the heights of a line scan, both in m, from a table.
 
     If the columns have no names, the positions are the column whose numbers only rise or only fall. If the table
-    contains heights alone, the user must give the spacing.
+    contains only heights, the user must give the spacing.
     """
     text = file.read_text()
     sheet = read_sheet(text, file.name)

@@ -32,7 +32,7 @@ class _History(Parameters):
 
     start: Literal["steady", "rest"] = Field(
         default="steady",
-        description="state before t = 0, under the parameter `normal_force`: steady sliding at the parameter "
+        description="state before t = 0 under the normal force `normal_force`: steady sliding at the velocity "
         "`velocity`, or rest",
     )
 
@@ -47,7 +47,7 @@ class Steps(_History):
     velocities: Numbers = quantity("m/s", "velocity after each of the times", usual="100 mm/s", min_length=1)
     forces: Numbers | None = quantity(
         "N",
-        "normal force after each of the times; by default always the parameter `normal_force`",
+        "normal force after each of the times; by default, the parameter `normal_force` at all times",
         usual="1 N",
         default=None,
     )

@@ -106,7 +106,7 @@ class Material(Parameters):
 
     @property
     def law(self) -> Law | None:
-        """The law of the temperature dependence of the relaxation times, or None if no law is given."""
+        """The law by which the relaxation times depend on the temperature, or None if no law is given."""
         return self.wlf or self.arrhenius or self.shift_factors
 
     @model_validator(mode="after")
@@ -154,9 +154,9 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return b_T at the material's temperature; 1 if the moduli do not come from a table.
+    """Return b_T at the material's temperature. The moduli of a table are divided by this factor.
 
-    The moduli of a table are divided by b_T.
+    Return 1 if the moduli do not come from a table.
     """
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
@@ -213,7 +213,7 @@ def fit_error(material: Material | None) -> float:
 def frequencies(material: Material) -> tuple[float, float] | None:
     """Return the lowest and highest angular frequency, in rad/s, of the data of a power law or a table.
 
-    Both are shifted to the material's temperature. Return None for other materials.
+    Both frequencies are shifted to the material's temperature. Return None for other materials.
     """
     fit = _fit_of(material)
     if fit is None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class ProfileFile(NamedByFile):
-    """A measured height profile. The user writes the name of a file alone, or `file: name` and options."""
+    """A measured height profile. The user writes only the name of a file, or `file: name` with options."""
 
     file: NamedFile = Field(
         description="file with two columns x, z; SurfaceTopography reads other formats if it is installed"
@@ -36,7 +36,11 @@ class ProfileFile(NamedByFile):
         default="mean", description="polynomial that is subtracted from the heights"
     )
     taper: float = quantity(
-        "1", "part of the line in which heights fade to their mean, so that the ends meet", default=0.0, ge=0, le=1
+        "1",
+        "fraction of the line, half of it at each end, in which the heights fade to their mean, so that the ends meet",
+        default=0.0,
+        ge=0,
+        le=1,
     )
     shortest_wavelength: float | None = quantity(
         "m", "shortest wavelength of the roughness; shorter waves are removed", usual="10 um", default=None, gt=0

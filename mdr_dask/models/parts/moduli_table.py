@@ -49,17 +49,23 @@ class ModulusTable(NamedByFile):
     reference: float | None = quantity(
         "K",
         "reference temperature; the curves of all other temperatures are shifted along the frequency until they "
-        "overlap. Without reference and table_temperature, wlf, arrhenius or shift_factors shift the curves",
+        "overlap. If neither reference nor table_temperature is given, wlf, arrhenius or shift_factors shifts the "
+        "curves",
         usual="20 degC",
         default=None,
         gt=0,
     )
     vertical: Literal["modulus", "none"] = Field(
         default="modulus",
-        description="modulus: moduli of different temperatures differ by b_T = rho0 T0 / (rho T); none: they do not",
+        description="modulus: the moduli at the temperature T are multiplied by b_T = rho0 T0 / (rho T), with the "
+        "densities rho0 at the reference temperature T0 and rho at T. none: the moduli are not multiplied",
     )
     poisson_ratio: float | None = quantity(
-        "1", "Poisson's ratio nu; it divides moduli measured in tension by 2 (1 + nu)", default=None, ge=-1, le=0.5
+        "1",
+        "Poisson's ratio nu, if the moduli were measured in tension; the moduli are then divided by 2 (1 + nu)",
+        default=None,
+        ge=-1,
+        le=0.5,
     )
     terms_per_decade: float = quantity(
         "1", "number of Prony terms for each decade of the relaxation times", default=1.0, gt=0, le=5
@@ -87,8 +93,8 @@ class Moduli:
     """One curve of moduli: angular frequency in rad/s, storage and loss modulus in Pa.
 
     `temperature` is the temperature of the curve in K, and `measured` are the lowest and the highest temperature of the
-    table in K. Both are None if neither the table nor the user states a temperature. `superposed` describes how the
-    curves of several temperatures were superposed.
+    table in K. `temperature` and `measured` are None if neither the table nor the user states a temperature.
+    `superposed` describes how the curves of several temperatures were superposed.
     """
 
     omega: FloatArray
@@ -112,7 +118,7 @@ def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
 
 
 def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the moduli at one temperature. They are shear moduli or moduli in tension, as in the table."""
+    """Return the moduli at one temperature: shear moduli or moduli in tension, whichever the table contains."""
     omega, storage, loss, temperature = _measured(chosen)
     if temperature is None:
         if chosen.reference is not None:

@@ -74,7 +74,7 @@ def is_numbered(line: FloatArray) -> bool:
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
     """Return the step of the positions in all given rows (or columns); raise DataError if two of their steps differ.
 
-    Rows of consecutive integers are row numbers and have no step. Return None if there are no other rows.
+    Rows of consecutive integers are row numbers and have no step. Return None if all given rows are row numbers.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
@@ -99,7 +99,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     if middles.size < 2 or len(known) != len(positions):
         raise DataError("expected positions on a regular grid")
     apart = np.diff(middles)
-    # whole steps, so that deviations of single positions do not add up
+    # distances in whole steps, so that deviations of single positions do not add up
     place = np.append(0.0, np.cumsum(np.rint(apart / np.median(apart))))
     step, origin = np.polyfit(place, middles, 1)
     nearest = np.rint((positions - origin) / step)
@@ -129,8 +129,9 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
 
     The largest number is replaced if its distance from the next smaller number exceeds the range of all numbers between
     the smallest and the largest. The same applies to the smallest number. If such a number occurs only once, it may be
-    the height of a narrow groove or peak; it is replaced only if its distance exceeds `FAR_ALONE` times the range. A
-    surface with at most `FEW_LEVELS` different heights between the two, such as a grating, is left unchanged.
+    the height of a narrow groove or peak; it is replaced only if its distance exceeds `FAR_ALONE` times this range. A
+    surface such as a grating, with at most `FEW_LEVELS` different heights between the smallest and the largest number,
+    is left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

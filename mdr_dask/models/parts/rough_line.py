@@ -100,7 +100,7 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The measured profile of a file. All realisations are this same line."""
+    """The measured profile of a file. All realisations are the same line."""
 
     profile: ProfileFile
     is_random = False
@@ -133,7 +133,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A line without roughness. Solvers choose their grids from `points`, as for a line with this number of points."""
+    """A line without roughness. Solvers choose the same grids as for a rough line with this number of points."""
 
     points: int
     is_random = False

@@ -56,7 +56,8 @@ class SlidingProblems:
     `which` holds, for every case, its index into `settings`, or -1 if the case cannot be solved. `loads` are F_N / (4
     G_inf L h) with the static shear modulus G_inf. `deborah` are the Deborah numbers eta v / (G_inf L) with the
     viscosity eta; for a Kelvin body this is v tau / L. `length` is the length L of the line in m. `height` is the rms
-    height h in m, or L if there is no roughness. `faults` has a message for each index of a case that cannot be solved.
+    height h in m, or L if there is no roughness. `faults` has a message for each case that cannot be solved; the key is
+    the index of the case.
     """
 
     settings: list[Setting]
@@ -81,7 +82,7 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs of Deborah number and load, and the index of its pair for every member."""
+        """Return the Deborah numbers and loads of the different pairs, and for every member the index of its pair."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
@@ -217,8 +218,8 @@ def _lines(
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
     """Return the static modulus in Pa and the ratio of viscosity to static modulus in s, both for every case.
 
-    Also return the Prony terms of each different solid (moduli divided by the static modulus, and relaxation times in
-    s; None for a Kelvin solid), and the index of its solid for every case.
+    Also return the Prony terms of each different solid, and for every case the index of its solid. Prony terms are
+    moduli divided by the static modulus, with relaxation times in s. They are None for a Kelvin solid.
     """
     static, viscosity = block.numbers("shear_modulus"), block.numbers("relaxation_time")
     materials, which = each(block, "material")

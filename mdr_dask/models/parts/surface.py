@@ -1,4 +1,4 @@
-"""A measured surface of a campaign, given by its spectrum, by maps, by scans, or by a line that is used as it is."""
+"""A measured surface of a campaign, given by its spectrum, by maps, by scans, or by a line that is used unchanged."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ class Surface(Parameters):
         "m", "shortest wavelength of the roughness; shorter waves are removed", usual="10 um", default=None, gt=0
     )
     extrapolate: bool = Field(
-        default=False, description="whether a power law extends the spectrum to the two wavelengths"
+        default=False,
+        description="whether a power law extends the spectrum to longest_wavelength and shortest_wavelength",
     )
 
     @model_validator(mode="after")
@@ -53,7 +54,7 @@ class Surface(Parameters):
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
             raise ValueError(
-                "shortest_wavelength and longest_wavelength of a profile are options of profile, without extrapolate: "
+                "a profile has its own options shortest_wavelength and longest_wavelength, and no option extrapolate: "
                 "write profile: {file: ..., shortest_wavelength: ...}"
             )
         if self.extrapolate and not any(ends):
@@ -112,7 +113,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the given parameters, with ``hurst: None`` if a measured surface is given and no Hurst exponent."""
+    """Return the parameters in `value`. With a measured surface but no Hurst exponent, add ``hurst: None``."""
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
 
@@ -130,7 +131,7 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between its cut-offs. If `shortest_wavelength` is not given, it ends where noise begins."""
+    """Return a spectrum between its cut-offs. Without `shortest_wavelength`, the spectrum ends where noise begins."""
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:

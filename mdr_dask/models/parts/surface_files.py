@@ -25,7 +25,7 @@ CUT_ERROR = 0.05  # assumed relative error of every point of a tabulated spectru
 # A surface counts as isotropic if its anisotropy does not exceed this. The slopes along x and y then differ by at most
 # about a quarter.
 MOST_ANISOTROPY = 0.25
-STRIPES = 10.0  # stripes: waves along an axis have more than this times the mean power of equally long waves
+STRIPES = 10.0  # waves along an axis count as stripes above this many times the mean power of equally long waves
 FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of their mean square
 # If more than this fraction of the points lie far from their neighbours, these points belong to the surface and are not
 # outliers.
@@ -54,19 +54,19 @@ class Found(NamedTuple):
 
 
 class Files(NamedByFile):
-    """Files of one surface. If a user writes the name of a file alone, all options have their default values."""
+    """Files of one surface. If a user writes only the name of a file, all options have their default values."""
 
     files: tuple[NamedFile, ...] = Field(
         strict=False, min_length=1, description="files of the same surface; each realisation uses one of them"
     )
 
     def found(self) -> tuple[Found, ...]:
-        """Return the spectrum of every file; raise DataError if a file has none."""
+        """Return the spectrum of every file; raise DataError if a file has no spectrum."""
         raise NotImplementedError
 
 
 class SpectrumTables(Files):
-    """Tables with wave number or wavelength, and a spectrum.
+    """Tables of a spectrum as a function of the wave number or of the wavelength.
 
     The spectrum is one of three: C2D of the surface, C1D of the line that replaces the surface in the method of
     dimensionality reduction, or the spectrum of a straight profile.
@@ -90,7 +90,7 @@ class HeightFiles(Files):
     unit: str = Field(default="", description="unit of the heights, if the file does not state it")
     x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
     window: Literal["hann", "none"] = Field(
-        default="hann", description="window for the Fourier transform; none only for periodic heights"
+        default="hann", description="window for the Fourier transform; write none only if the heights are periodic"
     )
 
 
@@ -119,7 +119,8 @@ class MapFiles(HeightFiles):
         default="keep", description="whether heights far from those of their neighbours are kept or replaced"
     )
     direction: Literal["x", "y"] | None = Field(
-        default=None, description="sliding direction on an anisotropic surface; the rough line is a cut along it"
+        default=None,
+        description="sliding direction on an anisotropic surface; the rough line is a cut along this direction",
     )
 
     def found(self) -> tuple[Found, ...]:
@@ -190,7 +191,7 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola fits the levelled heights well: then they may contain the form of the part.
+    """Return a warning if a parabola fits the levelled heights well, so that they may contain the form of the part.
 
     `level` are the heights without a fitted plane or line, and `curved` the heights without a fitted parabola.
     """
@@ -227,7 +228,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map: the mean over all directions, or that of profiles along the sliding direction."""
+    """Return the spectrum of one map: averaged over all directions, or of profiles along the given `direction`."""
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 

@@ -119,8 +119,8 @@ def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray
     """Return the mean of several spectra at the wave numbers of the first one, and the relative standard error of the
     mean.
 
-    At each wave number, the mean includes only the spectra whose range contains this wave number. If there is only one,
-    the standard error is NaN.
+    At each wave number, the mean includes only the spectra whose range contains this wave number. If it includes
+    only one spectrum, the standard error is NaN.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

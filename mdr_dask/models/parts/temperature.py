@@ -23,7 +23,7 @@ class Wlf(Parameters):
     """The law of Williams, Landel and Ferry."""
 
     c1: float = quantity("1", "constant c1 of log10 a_T = -c1 (T - reference)/(c2 + T - reference)", usual="17.4", gt=0)
-    c2: float = quantity("K", "constant c2 of the same law", usual="51.6 K", gt=0)
+    c2: float = quantity("K", "constant c2 in the formula of c1", usual="51.6 K", gt=0)
     reference: float = quantity("K", "reference temperature for c1 and c2, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
@@ -53,10 +53,11 @@ class Arrhenius(Parameters):
 
 
 class ShiftFactors(NamedByFile):
-    """Measured shift factors. The user writes the name of a file alone, or `file: name`."""
+    """Measured shift factors. The user writes only the name of a file, or `file: name`."""
 
     file: NamedFile = Field(
-        description="table with the columns temperature, and a_T or log10 a_T; a_T must pass through 1"
+        description="table with the columns temperature, and a_T or log10 a_T; the values of a_T must include or "
+        "enclose 1"
     )
 
     @model_validator(mode="after")
@@ -85,7 +86,7 @@ class ShiftFactors(NamedByFile):
 
 @lru_cache(maxsize=16)
 def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
-    """Return the temperatures of a table, in ascending order, and log10 a_T at these temperatures, which decreases."""
+    """Return the temperatures of a table in ascending order, and the decreasing values of log10 a_T."""
     name = factors.file.name
     columns = (
         Column("temperature", "K", above=0),

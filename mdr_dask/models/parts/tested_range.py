@@ -1,4 +1,4 @@
-"""Messages about results on measured surfaces outside the range in which the method was tested (docs/validity.md)."""
+"""Messages about cases with measured surfaces outside the range in which the method was tested (docs/validity.md)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
-    """Return a dict from the index of a case to a message, for all cases outside the tested range.
+    """Return a message for every case outside the tested range. The key is the index of the case.
 
     `loads` are F_N / (4 G_inf L h), and `fractions` are the fractions of the line in contact. For a loading history,
     both are the largest values during the history. Only plane bodies with the spectrum of a measured surface are
