@@ -36,8 +36,8 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     returns this error, as ``<output>_error``.
 
     A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
-    real, does not have the declared shape, or is not finite although ``allow_nan`` is False. Negative errors are also
-    failures.
+    real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A negative error is
+    a failure, too.
     """
 
     def compute(block: Block[Any]) -> Result:

@@ -51,7 +51,7 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return one function for each output. It computes the output from the solution on one grid.
+    """Return, for each output, a function that computes the output from the solution on one grid.
 
     The functions return positions divided by the half width a, film thicknesses divided by a^2/R, and pressures
     divided by Hertz' maximum pressure.

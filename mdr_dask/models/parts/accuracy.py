@@ -1,4 +1,4 @@
-"""Find the cases of any model whose estimated errors exceed the accuracy that the campaign requires."""
+"""Find the cases whose estimated errors exceed the accuracy that a campaign requires. All models use this module."""
 
 from __future__ import annotations
 

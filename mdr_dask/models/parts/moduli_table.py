@@ -186,7 +186,7 @@ def _vertical(chosen: ModulusTable) -> str:
 
 @lru_cache(maxsize=16)
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
-    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text for the user."""
+    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text with log10 a_T."""
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     omega, storage, loss, temperature = _measured(chosen)

@@ -256,7 +256,7 @@ class _Followed(_Group):
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a coarser grid. With every = 4, for example, the grid consists of each fourth node."""
+        """Compute the case on a coarser grid. With every = 4, for example, the grid consists of every fourth node."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
