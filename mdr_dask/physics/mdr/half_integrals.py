@@ -20,9 +20,9 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels between `edges`; on each panel, a function is the polynomial through its values at the `nodes`.
+    """Panels between `edges`; in each panel, a polynomial through values at the `nodes` represents a function.
 
-    Each panel has `order` nodes: the interior Lobatto points and the right end. There is no node at the first edge, 0,
+    Each panel has `order` nodes: the interior Lobatto points and its right end. There is no node at the first edge, 0,
     because functions may jump there. `barycentric`, shape (panels, order + 1), holds the weights of barycentric
     interpolation; in the row of the first panel, only the last `order` weights are used.
     """

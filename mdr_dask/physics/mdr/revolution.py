@@ -202,7 +202,7 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0)
 
 
-#: For `from_body`: largest radius of the profile divided by a0, and half the number of pieces between two breaks.
+#: Numbers for `from_body`: the largest radius divided by a0, and half the number of pieces between adjacent `ends`.
 FARTHEST, KNOTS = 8.0, 80
 
 

@@ -1,4 +1,4 @@
-"""The transforms of piecewise linear functions on a uniform grid; the singular integrals over a cell are exact.
+"""The transforms of piecewise linear functions on a uniform grid, with exact integrals over each cell.
 
 With the cell width h, the error of the inverse transform is proportional to h^2, and that of the forward transform to
 h^1.5. The error of the pressure is proportional to h and largest next to the axis. Unlike the panels of
@@ -44,7 +44,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p / E* at the nodes; in the last cell, the line load falls to zero at the contact edge."""
+        """Return p / E* at the nodes; in the last cell, the line load falls linearly to zero at the contact edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load

@@ -1,4 +1,4 @@
-"""Areal maps: spectrum in rings of the wave vector, straight profiles, slopes and anisotropy."""
+"""Areal maps: spectrum in rings of constant wave number, straight profiles, slopes and anisotropy."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the lar
 MOST_SCATTER = 0.02  # an octave is used if scatter alone causes angular harmonics with at most this mean square
 FLAT = 1e-12  # a map is flat if its range of heights is at most this fraction of its largest height
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
-HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent if Hann's window is used
+HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent with the Hann window
 
 
 class SurfaceMap(NamedTuple):
@@ -142,7 +142,7 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 
 
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
-    """Return Hann's window as a function of the distance from the centre.
+    """Return the Hann window as a function of the distance from the centre.
 
     The mean square of the window is 1; the window is 0 beyond half the shorter side of the map.
     """
@@ -215,7 +215,7 @@ class MapSpectrum:
         """
         there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # consecutive indices of the octaves with rings
+        _, octave = np.unique(octave, return_inverse=True)  # number only the octaves that contain rings
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -256,7 +256,7 @@ def _rings(
     size: tuple[float, float],
     modes: float,
 ) -> MapSpectrum:
-    """Return the spectrum in rings of the wave vector, from the squared amplitudes (power) of the waves."""
+    """Return the spectrum in rings of constant wave number, from the squared amplitudes (power) of the waves."""
     step = 2 * np.pi / min(size)
     last = int(np.pi * min(n / length for n, length in zip(points, size, strict=True)) / step + 1e-9)
     square_x, square_y = (q_x**2)[:, None], q_y**2

@@ -44,7 +44,7 @@ class Cut(NamedTuple):
 def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     """Return the spectrum of detrended scans of equal length and spacing, averaged in logarithmic bins.
 
-    Hann's window, if used, is normalised so that <h^2> is preserved.
+    The Hann window, if used, is normalised so that <h^2> is preserved.
     """
     points, length = lines[0].height.size, lines[0].length
     if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
@@ -75,7 +75,7 @@ def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, co
 
 
 def hann_window(points: int) -> FloatArray:
-    """Return Hann's window with a mean square of one."""
+    """Return the Hann window with a mean square of one."""
     window = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(points) + 0.5) / points)
     return np.asarray(window / np.sqrt(np.mean(window**2)))
 
@@ -91,9 +91,9 @@ def _until_the_end(cut: Cut) -> slice:
 def of_cut(cut: Cut) -> Spectrum:
     """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
 
-    A least-squares fit finds C2D, a power law between adjacent wave numbers of the cut. The explicit inverse -1/pi int
-    C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise. Therefore the change of the slope d log C2D / d log q from bin
-    to bin has a normal prior with the standard deviation `BEND`.
+    C2D, a power law between adjacent wave numbers of the cut, is found by a least-squares fit. The fit amplifies noise
+    less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the slope d log C2D /
+    d log q from bin to bin has a normal prior with the standard deviation `BEND`.
     """
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:

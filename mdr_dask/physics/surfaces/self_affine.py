@@ -33,7 +33,7 @@ class SelfAffine(NamedTuple):
     hurst: Interval
     longest: Interval | None
     shortest: Interval | None
-    misfit: float  # rms deviation of log C2D from the law, divided by the errors
+    misfit: float  # rms deviation of log C2D from the law, divided by the standard errors
 
 
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
@@ -68,8 +68,8 @@ def steep_limit(bins: Cut) -> float:
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
     """Fit a power law to C2D; return None if the spectrum is not a power law or has too few bins.
 
-    Schwarz's information criterion decides whether there are cut-offs, and at which bins. The intervals follow from the
-    likelihood, and are wider if the spectrum deviates from the law by more than its errors.
+    Schwarz's information criterion decides whether there are cut-offs, and at which bins. The confidence intervals
+    follow from the likelihood; they are wider if the spectrum deviates from the law by more than its standard errors.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

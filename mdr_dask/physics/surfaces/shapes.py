@@ -11,7 +11,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 
 ITERATIONS = 200
-ROUNDING = 1e-14  # relative step at which Newton's method ends
+ROUNDING = 1e-14  # Newton's method ends when its relative step is smaller than this
 
 
 def mapped(exponent: float) -> float:

@@ -1,6 +1,6 @@
 """A closed line as a cubic spline with one coefficient for each of its equidistant nodes.
 
-Between two nodes, with t from 0 to 1, the line is ``a0 + a1 t + a2 t^2 + a3 t^3``. Between these nodes, the line lies
+Between two nodes, with t from 0 to 1, the line is ``a0 + a1 t + a2 t^2 + a3 t^3``. In this interval, the line lies
 between the smallest and the largest of four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
@@ -22,9 +22,9 @@ Piece = tuple[float, float, float, float]
 def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     """Return the coefficients of the least-squares spline of a sum of waves with at least two nodes per shortest wave.
 
-    `waves` contains half of the complex amplitude of every wave. Each entry is multiplied by a factor. The factor is
-    the Fourier transform of the B-spline, divided by the sum of the squares of this transform over all aliases of the
-    wave (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
+    `waves` contains half of the complex amplitude of every wave. Each amplitude is multiplied by the Fourier transform
+    of the B-spline, divided by the sum of the squares of this transform over all aliases of the wave (Unser,
+    IEEE Signal Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 
@@ -105,7 +105,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     There are at most three. There is none if all four coefficients are positive, or if none of the four is positive.
     """
     of = piece(spline, k)
-    # the formula with which `piece` computes the start of the next piece, so that adjacent pieces agree
+    # the formula by which `piece` computes the first height of the next piece, so that adjacent pieces agree
     end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6
     t_before, before = 0.0, of[0]
     first, second = _extremes(of)
@@ -156,6 +156,6 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: Newton's method ends with a step of at most `CLOSE`; the error is about its square. `STEPS` halvings make the
-#: interval as short as the rounding error.
+#: Newton's method ends with a step of at most `CLOSE`; the remaining error is about the square of the last step. Even
+#: if every step halves the interval, `STEPS` steps are enough for the accuracy of the floating-point numbers.
 CLOSE, STEPS = 1e-7, 60

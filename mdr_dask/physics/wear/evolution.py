@@ -18,7 +18,7 @@ from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels
 from mdr_dask.physics.outcome import Outcome
 
-#: The local error of a BDF step of order 1, 2 or 3 is this fraction of the difference between the result and the value
+#: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
@@ -52,8 +52,8 @@ class Moment:
     """The contact at one `time`, which is the number of cycles N in partial slip and the sliding path s in gross slip.
 
     `unknowns`, all of the order of one, begin with the image at all nodes except the last. The next unknown is the
-    width of all panels together, in squared radii, divided by the width in the virgin contact. The other unknowns
-    depend on the problem. `accumulated`, shape (nodes,), is the worn depth at the nodes, which is zero at the edge.
+    difference of r^2 between the edge and the inner border, divided by its value in the virgin contact. The other
+    unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
     """
 
     time: float
@@ -84,7 +84,7 @@ class Problem(Protocol):
         """Return the moment at the end of a solved step."""
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return (accumulated quantity) - known - theta * rate at every node, and the conditions at the edge."""
+        """Return (accumulated quantity) - known - theta * rate at every node, then the residuals of other equations."""
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives of the residual with respect to the nodal unknowns."""
@@ -129,10 +129,7 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as a solution of the discrete equations.
-
-    A march that begins with this contact does not jump in its first step.
-    """
+    """Return the virgin contact as a solution of the discrete equations, so that the first step has no jump."""
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
@@ -163,7 +160,7 @@ def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) 
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
-    """Return the integral of a rate up to every moment, by the BDF formulas of the steps."""
+    """Return the integral of the `rates` over time, up to every moment, by the BDF formulas of the steps."""
     total = np.zeros(len(history))
     for number in range(1, len(history)):
         order = min(number, 3)

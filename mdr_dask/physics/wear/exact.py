@@ -1,7 +1,7 @@
 """Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force.
 
 Each contact is solved three times, each time with coarser panels and longer steps. The differences between these
-solutions give the error.
+solutions give the errors of the first one.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ SHARPEST = 8.0
 
 
 class Resolution(NamedTuple):
-    """Panels and steps for a given `accuracy`, the allowed error of the profile f divided by eta d0.
+    """Panels and steps for a given `accuracy`: the allowed error of the profile f, divided by eta d0.
 
     `rougher` is 0 for the solution itself. It is 1 and 2 for the two coarser solutions from which the error is
     estimated.
@@ -81,7 +81,7 @@ class Resolution(NamedTuple):
     def first(self) -> float:
         """The length of the first step, as a fraction of the time scale of the contact.
 
-        It is limited, so that the error of small amounts of wear remains below 2 %.
+        It is limited, so that the relative error remains below 2 % even after little wear.
         """
         return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
 
@@ -177,7 +177,7 @@ def exact(
 
 
 class _Leg(NamedTuple):
-    """A part of an evolution. `before` is the energy that was dissipated before this part, divided by mu."""
+    """The part of an evolution with one `problem`; `before` is the energy dissipated earlier, divided by mu."""
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
@@ -269,10 +269,10 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
 
 
 def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
-    """Return radii that the stick border has passed, the depths at these times, and the slope of the image.
+    """Return the radii that the stick border has passed, the depth at which it passed each radius, and a function.
 
-    The depths are in d0. The image at such a radius remains the depth at that time minus eta. The slope of the image is
-    returned as a function of position.
+    The depths are in units of d0. From then on, the image at a radius is this depth minus eta. The function returns the
+    slope of the image at any position.
     """
     places, depths = rising(path)
     radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
@@ -374,10 +374,7 @@ def _contact(leg: _Leg, time: float) -> Worn:
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return limits of integration between c and the border.
-
-    They become denser towards the border, because the image is steep there.
-    """
+    """Return the ends of the pieces of integration from c to the border, densest where the image is steep."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
@@ -386,7 +383,7 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
 def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
     """Return the contact after each wanted sliding path; all are taken from the same solution.
 
-    Near the axis, f is proportional to the power n/2 of r^2, so a body with n < 2 needs smaller panels there.
+    Near the axis, f ~ r^n = (r^2)^(n/2), so a body with n < 2 needs smaller panels there.
     """
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
     sharpness = float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0

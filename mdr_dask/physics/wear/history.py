@@ -1,7 +1,7 @@
 """Wear under blocks of different amplitude, depth or force; every block is a new problem of partial or gross slip.
 
 The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
-grid is uniform, because each block leaves a kink or a jump of the image at its own stick border.
+grid is uniform, because each load block leaves a kink or a jump in the image at a new place, its own stick border.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from mdr_dask.physics.wear.worn import Worn
 STEP_SHARE = 0.45
 """Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings."""
 LEAST_EDGE_ERROR = 0.5
-"""Least stated error of contact radius and stick border, in cells; the results of two grids may agree by chance."""
+"""Least stated error of contact radius and stick border, in cell widths; two grids may agree by chance."""
 
 
 @dataclass(frozen=True)
 class LoadBlock:
-    """A number of cycles with a constant amplitude, and with a constant `depth` (in d0) or `force` (in E* d0 a0).
+    """A number of cycles of constant amplitude, at constant `depth` (unit d0) or constant `force` (unit E* d0 a0).
 
     `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is eta = G*
     U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross; an infinite eta means sliding.
@@ -43,7 +43,7 @@ def history(
 
     The error is about proportional to the cell width, or, once the image has a jump, to the square root of the cell
     width. `reach` is the largest radius of the grid in units of a0. If `errors` is True, the errors are estimated from
-    two more solutions, with 1/2 and 1/4 of the cells.
+    two more solutions, with 1/2 and 1/4 of this number of cells.
     """
     length = min(reach, profile.largest_radius)
     fine, *rough = (

@@ -1,8 +1,8 @@
 """The fast rule of the thesis for wear at constant depth, and the limiting profile, for any body of revolution.
 
 In the fast rule (thesis eq. 6.11), y = (g - g0(c)) / eta with eta = 1 - g0(c) follows a logistic law up to x = 1.
-Beyond x = 1, g - 1 decays exponentially. Both laws contain the remaining fraction exp(-xi N / a(c)). In the limiting
-profile (eqs. 6.8-6.10), the remaining fraction is zero.
+Beyond x = 1, g - 1 decays to the fraction exp(-xi N / a(c)) of g0 - 1. The logistic law depends on N through the same
+fraction. In the limiting profile (eqs. 6.8-6.10), this fraction is zero.
 """
 
 from __future__ import annotations
@@ -227,9 +227,8 @@ def _scar_radius(
 ) -> float:
     """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is none.
 
-    `low_value` and `high_value` are the values of the integral at `low` and `high`. The method is that of Anderson and
-    Björck: the false position, in which the value at one end is reduced if this end was not replaced in two successive
-    steps.
+    `low_value` and `high_value` are the values of the integral at `low` and `high`. The method is the false position as
+    improved by Anderson and Björck: if one end of the interval is kept in two successive steps, its value is reduced.
     """
     if not high_value < 0.0 < low_value:
         return high

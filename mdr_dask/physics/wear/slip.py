@@ -98,11 +98,10 @@ class SlipMoment(Moment):
 class PartialSlip:
     """Slip s = (f - f_star) / eta outside the stick border b.
 
-    When the border passes a radius, the image there is g = d - eta with the depth d at this time; afterwards, the image
-    does not change. f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While
-    the plateau rises by dd, f_star rises by (2/pi) arccos(b / r) dd, so it is enough to store the path (b, d). At
-    constant depth, the border b stays at c. Under constant force, the border moves outwards until the image has a jump
-    at the border.
+    If the border passes a radius when the depth is d1, the image there is g = d1 - eta from then on. At the depth d,
+    f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While the plateau
+    rises by dd, f_star rises by (2/pi) arccos(b / r) dd, so it is enough to store the path (b, d). At constant depth,
+    the border b stays at c. Under constant force, the border moves outwards until the image has a jump at the border.
 
     The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
     Under constant force, the next unknown is the depth. As long as the border moves, the last unknown is the border.
@@ -403,7 +402,7 @@ def _plateau_rise(body: VirginBody, path: FloatArray, places: FloatArray) -> Flo
 
 @jit
 def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
-    """Return the rise of f_star at q along the path: (2/pi) int arccos(b / r) dd over the part with b < r."""
+    """Return the rise of f_star at q: 2/pi times the integral of arccos(b / r) over the depth, where b < r."""
     total = 0.0
     for k in range(1, path.shape[1]):
         total += _piece(body, path[0, k - 1], path[0, k], path[1, k] - path[1, k - 1], q)
@@ -437,7 +436,7 @@ def _piece(body: VirginBody, first: float, last: float, change: float, q: float)
 
 @dataclass(frozen=True, eq=False)
 class GrossSlip:
-    """Slip in the whole contact; the nodes lie at r^2 = z a^2, with the position z on the panels.
+    """Slip in the whole contact; the nodes lie at r^2 = z a^2, where z are the nodes of `panels`, between 0 and 1.
 
     The unknowns are the image g at all nodes except the last, where g = d, the squared contact radius a^2, and the
     depth d if the force is given. The accumulated quantity is the worn depth int p ds.
