@@ -87,7 +87,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the last index in [low, high) at which the ascending values are at most x, or `low` if all are above x."""
+    """Return the last index in [low, high) with values[index] <= x, or `low` if none; `values` must be ascending."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

@@ -21,12 +21,12 @@ class Factors(NamedTuple):
     pivots: NDArray[np.int32]
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return the solution x of matrix @ x = right, for one vector `right` or several columns."""
+        """Return the solution x of matrix @ x = right, where `right` is a vector or a matrix."""
         return np.asarray(dgetrs(self.triangles, self.pivots, right, trans=1)[0])
 
 
 def factorise(matrix: FloatArray) -> Factors | None:
-    """Return the factors of a square matrix in C order, or None if the matrix is singular or not finite.
+    """Return the LU factors of a square C-ordered matrix, or None if the matrix is singular or not finite.
 
     The matrix is overwritten.
     """

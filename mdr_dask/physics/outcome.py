@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended; compiled functions return the number, for example 0 for CONVERGED."""
+    """How a solver ended. Compiled functions return the number of the outcome, for example 0 for CONVERGED."""
 
     CONVERGED = 0
     DEPTH_NOT_FOUND = 1

@@ -7,10 +7,10 @@ as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
-The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is needed because the results on two grids may agree by chance: after the change b, the
-next change should be b / r. The last term e (`Solution.unseen`) is for errors that may be the same on two grids and
-then do not show in the difference of the results.
+In the maximum, c / (r - 1) is Richardson's estimate; b / (r (r - 1)) is needed because the results on two grids may
+agree by chance: after the change b, the next change should be b / r. The safety factor is that of the grid convergence
+index (Roache, J. Fluids Eng. 116, 405, 1994). The last term e (`Solution.unseen`) covers errors that may be equal on
+two grids and then do not show in the difference of the results.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Solution(NamedTuple):
     """Results of some cases on one grid.
 
     `values` contains one array per output, with one number or one profile per case. NaN in a profile marks positions
-    where the output does not exist. `outcome` contains values of `Outcome`. `unseen` is a relative error that is added
-    to the estimate, because the difference between two grids may not show it. It is one number, or has the shape
+    where the output does not exist. `outcome` contains values of `Outcome`. `unseen` is a relative error that the
+    difference between two grids may not show. It is added to the error estimate. It is a number or an array of shape
     (outputs, cases).
     """
 
@@ -80,16 +80,16 @@ def refine(
     shared: bool = True,
     requested: int | None = None,
 ) -> Refined:
-    """Solve every case on the coarsest grid on which all requested outputs meet an accuracy.
+    """Solve every case on the coarsest grid on which all requested outputs meet `accuracy`.
 
     The function `solve(level, cases)` solves the cases with the given indices on the grid of a level. It must not raise
     an exception for a case that fails. Every case is solved on at least two levels, unless it fails because of its
     parameters. If a case fails on fine grids only, the solution on the finest of the coarser grids is returned.
 
-    The accuracy of an output is relative to the largest absolute value of the output, or to its floor if the floor is
-    larger. With an infinite accuracy, the second level is accepted. `order` is the order of convergence of the dominant
-    part of the error. `requested` is the number of outputs that must meet the accuracy, or None for all outputs. These
-    outputs come first. The errors of the other outputs are infinite.
+    The accuracy of an output is relative to the largest absolute value of the output, or to its entry in `floors` if
+    that is larger. If `accuracy` is infinite, the second level is accepted. `order` is the order of convergence of the
+    dominant part of the error. `requested` is the number of outputs that must meet the accuracy, or None for all
+    outputs. These outputs come first. The errors of the other outputs are infinite.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all outputs of
     this case, because one output alone may be the same on two grids by chance. Choose False for outputs that converge
@@ -136,7 +136,7 @@ def refine(
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
-    For a profile, the largest change is divided by the largest absolute value. The change is infinite if a case has no
+    The largest change of a profile is divided by its largest absolute value. The change is infinite if a case has no
     solution on one of the grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
@@ -151,12 +151,12 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return the largest absolute value of each output in each case, or the floor if the floor is larger."""
+    """Return the largest absolute value of each output in each case, or the output's floor if that is larger."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 
 def _largest(sizes: FloatArray) -> FloatArray:
-    """Return the largest number of each case; all numbers must be at least 0."""
+    """Return the largest entry of `sizes` for each case; no entry may be negative."""
     return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 

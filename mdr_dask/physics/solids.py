@@ -35,12 +35,12 @@ class LinearSolid:
 
 
 def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the Kelvin solid of modulus G, Pa, and relaxation time tau = eta / G, s."""
+    """Return the Kelvin solid of modulus G in Pa and relaxation time tau = eta / G in s."""
     return prony(shear_modulus, [], [], shear_modulus * relaxation_time)
 
 
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the standard solid: a spring and one Prony term (Pa, s).
+    """Return the standard solid, which has one Prony term; moduli in Pa, time in s.
 
     `static_modulus` is the modulus for very slow deformation, and `glass_modulus` the modulus for sudden deformation.
     """
@@ -103,7 +103,7 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return the relaxation modulus G(t), Pa, at the times t > 0, s, after a sudden strain.
+    """Return the relaxation modulus G(t) in Pa at the times t > 0 (in s) after a sudden strain.
 
     The relaxation modulus is the stress divided by the constant strain. The parallel dashpot carries no stress at t >
     0.

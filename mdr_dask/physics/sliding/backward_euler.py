@@ -1,4 +1,4 @@
-"""Steady state of a Kelvin foundation by backward Euler, the method of the papers, for many cases on one line.
+"""Steady state of a Kelvin foundation by backward Euler, as in the papers, for many cases on one line.
 
 The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height. The decay per
 step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes.
@@ -24,10 +24,10 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.sliding.cases import Cases, first_depths
 
 ITERATIONS = 200
-COARSENING = 8  # in the search for the depth, each grid has this many times as many nodes as the previous grid
+COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
 COARSEST = 64  # the search for the depth starts on a grid with at most this number of nodes
 # The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is an
-# estimate of the error that remains after the drag is extrapolated over the last step.
+# estimate of the relative error of the drag, which is extrapolated over the last step of the depth.
 CONVERGED = 1e-9
 EXACT_STEP = 1e-13  # the search also ends after a relative step of this size, which is a rounding error
 COARSE = 1e-3  # used instead of CONVERGED on all grids except the finest
@@ -69,7 +69,7 @@ class Moving(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Work arrays of a sweep over cases.
+    """Work arrays of a sweep.
 
     `state`, shape (ROWS, cases), is the state of each case; after the sweep the rows `U` and `FADE` contain the
     displacement at the end of the line and its derivative with respect to the depth. `packed` contains copies of state,
@@ -98,7 +98,7 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
 
 
 def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
-    """Return bounds and sums of every block, shape (n // BLOCK, 8)."""
+    """Return the columns `PEAK` to `SQUARES` of every block, shape (n // BLOCK, 8)."""
     whole = height.size // BLOCK * BLOCK
     h, t = height[:whole].reshape(-1, BLOCK), rise[:whole].reshape(-1, BLOCK)
     before = np.roll(height, 1)[:whole:BLOCK]
@@ -112,7 +112,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    The indices of the other cases are written to the queue. Return how many there are.
+    Write the indices of the other cases to the queue, and return their number.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -241,7 +241,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # behind the end of a line that is not periodic, both u and du/d(depth) decay exponentially
+            # beyond the end of a line that is not periodic, both u and du/d(depth) decay exponentially
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
@@ -270,7 +270,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """For every case, write the number of nodes in contact to `touched`, and the rms rise at these nodes to `slope`."""
+    """For every case, write the number of nodes in contact to `touched`, and the rms of their rises to `slope`."""
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -293,7 +293,7 @@ def steady_by_steps(
     """Return three arrays: depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
 
     A periodic line starts at the node after the highest node and ends at the highest node. On any other line, elements
-    enter undeformed at the first node. Deborah numbers are v tau / dx, and loads F_N / (4 G dx) in the unit of height.
+    enter undeformed at the first node. Deborah numbers are v tau / dx, loads are F_N / (4 G dx) in the unit of height.
     """
     strides = [1]
     while height.size > COARSEST * strides[-1]:

@@ -14,7 +14,7 @@ from mdr_dask.physics.outcome import Outcome
 Scheme = Literal["hermite", "backward_euler"]
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
-"""Names of the results of a case, in the order of the rows of an array of results."""
+"""Names of the results of a case; an array of results has its rows in this order."""
 
 
 class Cases(NamedTuple):

@@ -36,12 +36,12 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     if terms:
         relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
         pressure = pressure + series(waves * relaxing, nodes)
-    # the drag is the mean of pressure times slope over the nodes; the static pressure adds nothing to it, because the
+    # the drag is the mean of pressure times slope over the nodes; the static pressure adds no drag, because the
     # mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    # two nodes show for most cases that contact is not full: the node with the largest pressure without the dashpot,
-    # and the node with the largest slope
+    # first check two nodes that exclude full contact in most cases: the node with the largest pressure without the
+    # dashpot, and the node with the largest slope
     worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch

@@ -2,9 +2,9 @@
 
 The unit of length is the cell width, a slope is the rise over one cell, and ``deborah`` is the distance v tau in cells.
 Heights are measured from the highest point of the line, so that the penetration is w = depth + height with depth > 0.
-The displacement of an element is u = w in contact; after contact ends, u and du/d(depth) decay as exp(-s / deborah)
-with the distance s. A change of the depth also shifts the places where contact begins and ends, but this changes the
-load only to second order.
+The displacement of an element is u = w in contact; at the distance s after contact ends, u and du/d(depth) have decayed
+by the factor exp(-s / deborah). A change of the depth also shifts the places where contact begins and ends, but this
+changes the load only to second order.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is passed in one step
 TINY = 1e-290  # smaller displacements are set to 0
-CLOSE = 1e-8  # in cells; after a step of Newton's method shorter than this, the next step would be a rounding error
+CLOSE = 1e-8  # in cells; Newton's method ends after a step shorter than this; the next step would be a rounding error
 ITERATIONS = 80
 
 # Indices of the results of a sweep
@@ -85,7 +85,7 @@ def write_barriers(
 ) -> None:
     """Write the barriers of a block and of its cells, computed from the force w + deborah w'.
 
-    The values `idle` follow from the Bernstein coefficients of the force: the largest coefficient is an upper bound.
+    The limits `idle` follow from the largest Bernstein coefficient, which is an upper bound of the force.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -108,7 +108,7 @@ def write_barriers(
 
 @jit
 def _decayed(x: float) -> float:
-    """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
+    """Return 1 - exp(-x) for x >= 0. A series is used for small x: it is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
     # multiply by 1 / 5 instead of dividing by 5, because divisions would make a sweep 10 % slower
@@ -122,7 +122,7 @@ def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: 
 
     The force is w + deborah w', with w = w0 + a x + b x^2 + c x^3. At `start`, the force must not be negative.
     """
-    # search each monotone piece of the cubic force; because of rounding, the force at `start` may be negative
+    # search each monotone piece of the cubic force; because of rounding, the force at `start` may be just below 0
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
     low, positive = start, True
     discriminant = r * r - 3 * c * q
@@ -143,7 +143,7 @@ def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: 
 
 @jit
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
-    """Return the root of a cubic that decreases from `low` to `high`."""
+    """Return the root of a cubic that decreases between `low` and `high`."""
     x = low + (high - low) * 0.5
     for _ in range(ITERATIONS):
         force = p + x * (q + x * (r + x * c))
@@ -202,8 +202,8 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
     """Return the first place between `low` and `stop` where contact with a free element begins, or `NONE`.
 
-    With the displacement u_free of the element, (w - u_free) exp(x / deborah) increases wherever the force w + deborah
-    w' is positive. In each interval of positive force, contact therefore begins at most once.
+    Let u_free be the displacement of the element. Where the force w + deborah w' is positive, the product (w - u_free)
+    exp(x / deborah) increases. Contact therefore begins at most once in each interval of positive force.
     """
     w0, a, b, c, u, start = element
     for _ in range(3):
@@ -240,8 +240,8 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
     """Return four contributions of a free recovery: load, derivative of the load, drag, and derivative of the drag.
 
     Derivatives are with respect to the depth. The contribution to the load is the integral of u, which is deborah times
-    the decrease of u, and the drag is half the decrease of u^2. The derivative of the drag includes the shift of the
-    place where contact begins again; the line has the slope `slope` there.
+    the decrease of u; the contribution to the drag is half the decrease of u^2. The derivative of the drag includes the
+    shift of the place where contact begins again; the line has the slope `slope` there.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -275,8 +275,8 @@ def sweep_cells(
     The limits of a block that are still NaN are written to `barriers` when they are needed. The entries of `sums` are:
     the integral of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its
     derivative; the length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not
-    periodic is in contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the patches begin
-    and end; patches beyond its capacity are only counted.
+    periodic is in contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the first
+    `capacity` patches begin and end; further patches are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (

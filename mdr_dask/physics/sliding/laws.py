@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 INDENTER_EXPONENT = 1.5  # exponent alpha in eq. 3.40
-BETA = 1.6  # beta of eq. 3.11 for every Hurst exponent; computed: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
+BETA = 1.6  # beta of eq. 3.11 for every Hurst exponent; computed values: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
 
 
 def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
@@ -23,7 +23,7 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
     """Return v tau slope / (sqrt 2 h) (eq. 3.19).
 
-    If it is about 1, only the fronts of the asperities are in contact.
+    If this number is about 1, only the fronts of the asperities are in contact.
     """
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
@@ -49,7 +49,7 @@ def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
 
 
 def crossover(force: Any, exponent: Any, beta: Any) -> Any:
-    """Return the `velocity_number` at which the linear law for low velocities, extrapolated, reaches the plateau."""
+    """Return the `velocity_number` at which friction, extrapolated linearly from low velocity, reaches the plateau."""
     return np.hypot(force / 4, force**exponent / beta)
 
 
@@ -63,7 +63,7 @@ def indenter_low(
 def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     """Return mu / (sqrt 2 slope) of a rough indenter (eq. 3.40, 3.43).
 
-    The argument `xi` is mu / (sqrt 2 slope) with the value of mu at low velocity, from `indenter_low`.
+    The argument `xi` is mu / (sqrt 2 slope) with mu from `indenter_low`.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)
 

@@ -3,11 +3,11 @@
 The unit of length is the cell width: neighbouring nodes have the distance 1, and the Deborah number De is the distance
 v tau in cells. Inside a cell, the penetration w (depth plus height) is a cubic. The places where contact begins and
 ends are computed approximately. The load is the integral of w in contact and of u out of contact. The drag is the
-integral of De w'^2 in contact and of u^2 / De out of contact. All terms are positive, so that there is no cancellation
-in slow sliding. In full contact the results are exact on any grid.
+integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of the drag are positive, so that nothing
+cancels in slow sliding. In full contact the results are exact on any grid.
 
-If a block of cells is entirely in contact or entirely free in a case, its sums have closed forms. Otherwise the solver
-follows one element from cell to cell. The results of a case do not depend on the other cases.
+If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms.
+Otherwise the solver follows one element from cell to cell. The results of a case do not depend on the other cases.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 BLOCK = 32  # number of cells in a block
-WING = 4  # a node of a finer grid is interpolated from this number of nodes on each side of its cell
+WING = 4  # a node of a finer grid is interpolated from this number of nodes on each side of the cell around it
 BEFORE, AFTER = WING + 1, WING + 2  # `refine` needs these numbers of nodes before and after the period
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
@@ -47,9 +47,9 @@ class Nodes(NamedTuple):
     `height` is relative to the first node, `slope` is the rise per cell, and `ends` contains the results of `_ends_of`
     or is empty. These arrays begin with the last `BEFORE` nodes of the previous period, and end with the first `AFTER`
     nodes of the next period. A row of `blocks` contains, for one block: upper bound of the height, height of the lowest
-    node, smallest slope at a node, integral of the height, and integral of the squared slope. `top` is the height of
-    the first node in the given line. The highest point of the line is in the cell before the first node; `rise` is its
-    height above the first node. On coarse grids the first node is the highest node, and `rise` is 0.
+    node, smallest slope at a node, integral of the height, and integral of the squared slope. `top` is the height from
+    which `height` is measured. The highest point of the line is in the cell before the first node; `rise` is its height
+    above the first node. On coarse grids the first node is the highest node, and `rise` is 0.
     """
 
     height: FloatArray
@@ -77,8 +77,8 @@ def _ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int) -> Nodes:
     """Return the line that consists of every stride-th node of a line with two nodes per Nyquist point.
 
-    The line begins at node `first`. Slopes are derivatives with respect to x / L. If there is less than one node per
-    Nyquist point, the slopes are differences of the heights, because the nodes are too far apart.
+    The line begins at node `first`. The argument `slope` is the derivative of the height with respect to x / L. If
+    `stride` > 2 (less than one node per Nyquist point), the slopes are differences of the heights instead.
     """
     n = height.size // stride
 
@@ -167,7 +167,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write the tile for `cells` cells of the line from node `first` on, and return the number of cells of the tile.
+    """Write the tile for `cells` cells of the line, beginning at node `first`; return the number of cells of the tile.
 
     Each cell of the line is divided into ``weights.shape[1]`` cells of the tile. The nodes of a tile include one node
     before and one node after these cells.
@@ -225,7 +225,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
 
 
 def with_summit(line: Nodes) -> Nodes:
-    """Compute `rise`, and return the line with it; the highest point must be in the cell before the first node."""
+    """Return the line with the computed `rise`; the highest point must be in the cell before the first node."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))
     refine(line, BEFORE - 1, 1, table, height, slope)
@@ -305,7 +305,7 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return the place in a cell where contact ends, w there, and the fraction of w left at the end of the cell.
+    """Return the place in a cell where contact ends, w at this place, and the fraction of w left at the cell's end.
 
     Contact ends where the force falls to 0; from there on, the element recovers freely. The Deborah number is `r`, and
     `inverse` is 1 / r. The force falls from `force` at `begins` to `force_end` at the end of the cell. Linear
@@ -442,7 +442,7 @@ def _pass_block(
 ) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    The indices of the other cases are written to the queue. Return how many there are.
+    Write the indices of the other cases to the queue, and return their number.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -496,7 +496,7 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # order: the cell of the summit, where every case is in contact; the blocks; the cells behind the last block
+    # order: the cell of the summit, where every case is in contact; the blocks; the cells after the last block
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:
@@ -596,7 +596,7 @@ def _search(
 class NodeToNode:
     """Cases on a rough plane that are solved on finer and finer grids.
 
-    `error` is the largest relative error of the drag due to the search for the depth.
+    `error` is the allowed relative error of the drag due to an inexact depth.
     """
 
     def __init__(self, line: RoughLine, cases: Cases, error: float) -> None:

@@ -28,7 +28,7 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
-"""Floors of drag, depth, contact fraction and contact slope: an error is relative to the floor if the value is smaller.
+"""Floors of `Steady.columns`: the error of a result below its floor is relative to the floor.
 
 The floor of the depth is the unit of height, which is the rms height.
 """
@@ -56,11 +56,11 @@ class PronyTerms:
 class Request:
     """The requested results, and either the requested accuracy or a given grid.
 
-    `accuracy` is the allowed relative error; for small values see `FLOORS`. `oversampling` is the number of nodes per
+    `accuracy` is the allowed relative error; for small results see `FLOORS`. `oversampling` is the number of nodes per
     Nyquist point; "auto" selects the smallest number that meets the accuracy. The scheme for a Kelvin solid is
-    "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). `with_errors` is only used for a Kelvin
-    solid on a given grid; in all other cases the errors are always estimated. `contact` states whether contact fraction
-    and contact slope are requested; these two need finer grids than drag and depth.
+    "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). `with_errors` = False omits the error
+    estimates, but only for a Kelvin solid on a given grid. `contact` states whether contact fraction and contact slope
+    are requested; these two need finer grids than drag and depth.
     """
 
     accuracy: float = 0.01
@@ -71,7 +71,7 @@ class Request:
 
     @property
     def columns(self) -> int:
-        """Number of requested results, in the order of `Steady.columns`: drag and depth, or all four."""
+        """Number of requested results: the first two of `Steady.columns` (drag and depth), or all four."""
         return 4 if self.contact else 2
 
 
@@ -142,7 +142,7 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
         depths[some] = found.depth
         return Solution(found.columns, found.status)
 
-    # sweeps over cubic cells have the order ORDER_OF_CELLS only from two nodes per Nyquist point on
+    # sweeps over cubic cells have the order ORDER_OF_CELLS only with at least two nodes per Nyquist point
     order = ORDER_OF_CELLS if request.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
     return refine(solve, cases.loads.size, levels, accuracy, order, floors=FLOORS, requested=request.columns)
 
@@ -196,7 +196,7 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
     solids = [prony(1.0, terms.moduli, terms.deborah, deborah[k]) for k in left]
     searches = [viscoelastic.ViscoelasticCase(solid, load) for solid, load in zip(solids, loads[left], strict=True)]
     line = line.from_summit()
-    # number of cells of the coarsest grid; on each finer grid, results are extrapolated from this and the previous grid
+    # number of cells of the coarsest grid; every later result is extrapolated from its grid and the previous grid
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
 
     def solve(level: int, some: IntArray) -> Solution:

@@ -33,7 +33,7 @@ from mdr_dask.physics.sliding.kelvin import (
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
-PATIENCE = 20  # after this number of sweeps, the search halves the interval that contains the depth
+PATIENCE = 20  # after this number of sweeps, the search continues by bisection
 LOST = 1e-13  # rounding errors dominate if the rise in `_is_lost` is below this fraction of the depth
 # A trail describes the depth as a function of the load near the last sweep. Its five entries are: log depth, log load,
 # slope d(log depth) / d(log load), derivative of this slope with respect to the log load, and Deborah number.
@@ -66,8 +66,8 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
     """Update a `trail` (see `TRAIL`) after a sweep at a depth.
 
-    The derivative of the slope follows from the last two sweeps. This derivative hardly depends on the Deborah number;
-    it is kept if the last two sweeps had different Deborah numbers.
+    The derivative of the slope follows from the last two sweeps. If these had different Deborah numbers, the derivative
+    is kept, because it hardly depends on the Deborah number.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -100,11 +100,11 @@ def _solve(
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
-    The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent reaches
-    `load` is an upper bound of the solution, and so is the depth at which full contact carries the load. If a lattice
-    depth carries at most `load`, and the tangent at this depth reaches `load` before the next lattice depth, the search
-    ends there. The result does not depend on the guess in `trail`, because there is only one largest lattice depth that
-    carries at most `load`. `sums` receives the sums at this depth.
+    The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent to this
+    function reaches `load` is an upper bound of the solution, and so is the depth at which full contact carries the
+    load. If a lattice depth carries at most `load`, and the tangent at this depth reaches `load` before the next
+    lattice depth, the search ends there. The result does not depend on the guess in `trail`, because there is only one
+    largest lattice depth that carries at most `load`. `sums` receives the sums at this depth.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -153,9 +153,9 @@ def _states(
 ) -> None:
     """Solve cases on one line at one Deborah number, in ascending order of the load.
 
-    The columns of `results` are in the order of `cases.COLUMNS`. The search for the depth starts from the guess for the
-    case, or, if the guess is NaN, from the trail of the previous case. The first case starts from the trail `first`,
-    which is replaced by the trail of the first case that was solved.
+    `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the guess for the case, or,
+    if the guess is NaN, from the trail of the previous case. The first case starts from the trail `first`, which is
+    replaced by the trail of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))
@@ -236,8 +236,8 @@ def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, con
     """Return the steady states by backward Euler, the time-stepping method of the papers.
 
     The arguments are those of `steady_sliding`. Only the heights of the nodes are used. In each time step the body
-    travels one cell; the method is of first order in this length. Contact fraction and contact slope take extra time,
-    and are computed only if `contact` is True.
+    travels one cell; the method is of first order in the cell width. Contact fraction and contact slope take extra
+    time, and are computed only if `contact` is True.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -285,12 +285,11 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return for each case whether rounding errors dominate.
+    """Return for each case whether rounding errors dominate the results.
 
-    They do if the line rises very little from the place where contact begins to the highest point.
-
-    If the dashpots carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of
-    the two nodes next to the highest point, relative to the highest point.
+    They do if the line rises very little from the place where contact begins to the highest point. If the dashpots
+    carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of the two nodes next
+    to the highest point, relative to the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

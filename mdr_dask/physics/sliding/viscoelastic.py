@@ -1,8 +1,8 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
-The stretch of Prony term m is e_m = u - a_m, where u is the displacement of the element and a_m the displacement of the
-dashpot of the term. Newton's method finds the depth. On a periodic line it also finds the stretches at the start of the
-line: after one period, each stretch must have the same value again.
+The stretch (elongation of the spring) of Prony term m is e_m = u - a_m, where u is the displacement of the element and
+a_m the displacement of the dashpot of the term. Newton's method finds the depth. On a periodic line it also finds the
+values e_m at the start of the line, which must be the same after one period.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mdr_dask.physics.solids import LinearSolid, recovery_times
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
-LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step; far below the error of the step
+LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step; the step itself has a larger error
 SWEEPS = 80
 DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one step
 SHORTEST = 1e-9  # in cells; the dashpot and all Prony terms with a smaller tau_m v become one term: see `travelling`
@@ -57,8 +57,8 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
     The force on an element of width dx is f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'], where u is the
     displacement of the element and a_m the displacement of the dashpot of Prony term m (thesis 3.3.3, extended to any
-    linear rheology). After the distance s the element is either in contact, with u = w(s) = d + h(s), or free, with
-    f = 0; d is the depth and h the height of the line.
+    linear rheology). At the distance s the element is either in contact, with u = w(s) = d + h(s), or free, with f = 0;
+    d is the depth and h the height of the line.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
         of cells must be a multiple of four, because the case is also solved with only every second and only every
         fourth node.
     solid : LinearSolid
-        The material. In place of its relaxation times it contains the Deborah numbers tau_m v / L.
+        The material, with the Deborah numbers tau_m v / L as `times` and eta v / L as `viscosity`.
     load : float
         F_N / (4 G_inf L), in the unit of height.
 
@@ -134,7 +134,7 @@ class ViscoelasticCase:
         result = values.copy()
         if self._before is not None:
             change = values - self._before
-            # with a larger change, the extrapolation might reverse the sign of the result
+            # if the change exceeds the value, the extrapolation might reverse the sign of the value
             extrapolated = np.abs(change) <= np.abs(values)
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
@@ -165,7 +165,7 @@ class ViscoelasticCase:
 
 
 def travelling(solid: LinearSolid, cell: float) -> Travelling:
-    """Return a solid with lengths in cells and stresses divided by the static modulus.
+    """Return a solid with lengths divided by the cell width and stresses divided by the static modulus.
 
     The dashpot, and all Prony terms that relax within a very small fraction of a cell, are replaced by one Prony term
     with a very short relaxation time and the same viscosity.
@@ -188,9 +188,9 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
 class Swept(NamedTuple):
     """The solid, and the alternating free recoveries and contacts (pieces) of a sweep.
 
-    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). For a free recovery, these are the decay
-    lengths of the recovery modes; for a contact, those of the Prony terms. `lengths` contains the lengths of the
-    pieces, as in `Passage`.
+    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). The decay lengths in a free recovery belong to
+    the recovery modes, and in a contact to the Prony terms. `lengths` contains the lengths of the pieces, as in
+    `Passage`.
     """
 
     decayed: FloatArray
@@ -204,8 +204,8 @@ def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatAr
 
     The entries of `direction` are changes of the stretches e_m at the start of the line, and of the depth. `product`
     receives the changes of the integrals of all e_m, and of the integral of u. The places where contact begins and ends
-    are kept fixed, because u is continuous there and their shift is of second order. If the line is not periodic, the
-    recovery behind the line is included. `workspace`, shape (3, terms), is overwritten.
+    are kept fixed, because u is continuous there, so that their shift has only a second-order effect. If the line is
+    not periodic, the recovery beyond the line is included. `workspace`, shape (3, terms), is overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -294,7 +294,7 @@ def _dot(one: FloatArray, other: FloatArray) -> float:
 
 @jit
 def static_depth(profile: FloatArray, strain_area: float) -> float:
-    """Return the depth at which the sum of all positive penetrations depth + profile is `strain_area`."""
+    """Return the depth at which the positive entries of depth + profile have the sum `strain_area`."""
     depth = 0.0
     for value in profile:
         depth -= value
@@ -324,17 +324,17 @@ def solve_sliding(
     unknown: FloatArray,
     totals: FloatArray,
 ) -> int:
-    """Find the depth at a given load, and on a periodic line also the stretches that repeat after one period.
+    """Find the depth at a given load, and on a periodic line also the stretches e_m at the first node.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
     integral of u. This integral is `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing
     function of the unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
 
     Heights are relative to the highest node, which is the first and the last node of a periodic line. On any other
-    line, elements enter undeformed and recover behind the end of the line, so that the depth is the only unknown.
+    line, elements enter undeformed and recover beyond the end of the line, so that the depth is the only unknown.
     `unknown` contains the stretches e_m at the first node, then the depth; the first guesses are replaced by the
-    solution. `totals` receives the `totals` of the last `Passage`. Return an `Outcome`, which is `OUTSIDE_LINE` if a
-    line that is not periodic ends in contact.
+    solution. `totals` receives the `totals` of the last `Passage`. Return an `Outcome`, which is `OUTSIDE_LINE` if an
+    element is in contact at the end of a line that is not periodic.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     terms, nodes = moduli.size, profile.size
@@ -365,7 +365,7 @@ def solve_sliding(
             # the direction 1 for all unknowns: if the depth changes suddenly, each stretch changes by the same amount
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
-            # the load is the integral of the stress, because the integral of u behind the line may be unknown
+            # use the integral of the stress as the load, because the integral of u beyond the line may be unknown
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):

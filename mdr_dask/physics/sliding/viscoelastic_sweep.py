@@ -1,9 +1,9 @@
 """Exact sweep of a linear viscoelastic foundation along a line of straight cells.
 
-The unit of length is the cell width, and stresses are divided by the static modulus. The stretch e_m of Prony term m
-obeys de_m/ds = du/ds - e_m / deborah_m, where s is the travelled distance and deborah_m the distance tau_m v. In
-contact, u is the penetration w, and the stretches have closed forms. A free element recovers as a sum of exponential
-modes.
+The unit of length is the cell width, and stresses are divided by the static modulus. The stretch e_m of the spring in
+Prony term m obeys de_m/ds = du/ds - e_m / deborah_m, where s is the travelled distance and deborah_m the distance tau_m
+v. In contact, u is the penetration w, and the stretches have closed forms. A free element recovers as a sum of
+exponential modes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 
 @jit
 def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray) -> None:
-    """Write the factors `decay`, `gain` and `area` of every Prony term over a straight piece of the given length.
+    """Write the factors `decay`, `gain` and `area` of every Prony term for a straight piece of the given length.
 
     If e is the stretch at the start of the piece, the stretch at its end is decay * e + gain * slope, and the integral
     of the stretch over the piece is gain * e + area * slope.
@@ -126,7 +126,7 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
 
 @jit
 def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:
-    """Return the strain of a free element after a distance, and its derivative."""
+    """Return the strain of a free element after a distance, and its derivative with respect to the distance."""
     strain, rate = 0.0, 0.0
     for k in range(times.size):
         term = modes[k] * np.exp(-distance / times[k])
@@ -139,7 +139,7 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:
-    """Return the position where an element that is free from `place` on meets the line again, or -1.
+    """Return the position where an element that is free from `place` on meets the line again, or -1 if it does not.
 
     The search begins in the cell that ends at `node`. If contact ended inside a cell, the search must begin in the next
     cell, because the strain of the element is convex and does not meet the same straight cell again. The logarithm of a
@@ -171,7 +171,7 @@ class Passage(NamedTuple):
     `lengths` contains the lengths of free recoveries and contacts, which alternate; the first length is that of a free
     recovery and may be 0. For n nodes, the array needs at least 2 n + 2 entries. `imbalance` contains the integral of
     each e_m over the line. The six entries of `totals` are: integral of u; integral of the stress; integral of the
-    stress times the slope; length in contact; integral of slope^2 over the length in contact; integral of u behind the
+    stress times the slope; length in contact; integral of slope^2 over the length in contact; integral of u beyond the
     end of the line.
     """
 
@@ -249,7 +249,7 @@ def _contact(
 ) -> tuple[float, float, float, bool]:
     """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
 
-    Return the place where this happens, strain and remaining stress at this place, and whether the contact ends there
+    Return the final place of the element, the strain and the stress at this place, and whether contact ends there
     (False: the line ends first). The stretches are written to ``workspace[0]``. The node at which the search for the
     next contact begins is ``workspace[2, 0]``.
     """
