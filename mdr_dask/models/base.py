@@ -42,7 +42,7 @@ Whole = Annotated[int, BeforeValidator(unquoted)]
 
 
 class Parameters(BaseModel):
-    """Base class of every parameter set. The numbers are in SI units, and their bounds are checked.
+    """Base class of every parameter set. Quantities are converted to SI units, and their bounds are checked.
 
     A parameter set cannot be changed, and unknown keys are errors. A subclass may declare:
 
@@ -109,7 +109,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = usual.split(", ") if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
-    if unit != "m^(1-n)":  # the coefficient c of a body c r^50 may have any size
+    if unit != "m^(1-n)":  # no limits for the coefficient c of a body c r^n: it may have any size
         field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
@@ -147,7 +147,7 @@ CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Round dimensionless numbers, so that numbers with slightly different rounding errors become equal."""
+    """Round dimensionless numbers, so that numbers that differ only by rounding errors become equal."""
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
@@ -250,7 +250,7 @@ class Block(Generic[P]):
     accuracy: float | None = None
 
     def column(self, path: str) -> NDArray[Any]:
-        """Return the values of one parameter for all cases, whether it is varied or fixed; shape (cases,)."""
+        """Return the values of a varied or fixed parameter for all cases; shape (cases,)."""
         if path in self.columns:
             return self.columns[path]
         value: Any = reduce(getattr, path.split("."), self.parameters)
@@ -317,8 +317,8 @@ class Model(Generic[P]):
     version that created it.
     * `summary`: one line for ``mdr-dask models``.
     * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
-    * `compute`: a pure function. The value of a case depends on its parameters, the seed and its realisation, but not
-    on the other cases of the block. The function raises no exception for a case that fails.
+    * `compute`: a pure function. The outputs of a case depend on its parameters, the seed and its realisation, but
+    not on the other cases of the block. The function raises no exception for a case that fails.
     * `operations`: approximate number of floating-point operations of a block, from which block sizes are chosen. The
     function must be fast. If `operations` is None, a study with n results is divided into about sqrt(n) blocks.
     * `whole`: parameters whose axes are not divided among blocks, because cases along these axes share work. If a block

@@ -118,7 +118,7 @@ def _output(name: str, outputs: Any) -> NDArray[np.float64]:
 def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
     """Return an output as an array of floating-point numbers.
 
-    Raise ValueError if the output contains anything but real numbers, such as True, a text or a quantity with a unit.
+    Raise ValueError if the output contains, for example, True, a text or a quantity with a unit.
     """
     if type(value) is float:
         return np.asarray(value)

@@ -118,7 +118,7 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Raise ValueError unless one parameter of each pair is given, together with the others that it requires."""
+        """Raise ValueError unless one parameter of each pair is given, with the parameters that it requires."""
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:
@@ -190,8 +190,8 @@ OUTPUTS = (
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     """Return the dimensionless parameters W (load), U (speed) and G (material).
 
-    Those that a user does not give are computed. ``lookup(name)`` returns the values of the parameter `name`, or None
-    if the user does not give this parameter.
+    Numbers that the user does not give are computed. ``lookup(name)`` returns the values of the parameter `name`, or
+    None if the user does not give it.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")

@@ -75,7 +75,7 @@ Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discri
 #: one-dimensional image.
 Pressed = RoundedCone | Table
 
-#: For each shape of a body, the parameter that states its size in a dimensional campaign.
+#: For each shape, the parameter that states the size of the body in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
 
 
@@ -326,7 +326,7 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units that differ from the declared ones: ``"1"`` for path and outputs of dimensionless campaigns."""
+    """Return the units that differ from the declared units: ``"1"`` for path and outputs of dimensionless campaigns."""
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: The units of length, height and force of a case must lie between LEAST and 1 / LEAST, so that the cubes of these
 #: units do not overflow.
 LEAST = 1e-60
-MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
+MOST_CYCLES = 1e12  # largest allowed N; wear ends at a much smaller N
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Numbers:
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
     stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
-    in sliding wear. `advance` is this number divided by the parameter `cycles` or `path`. `length`, `height` and
-    `force` are the units a0, d0 and E* d0 a0.
+    in sliding wear. `advance` is N divided by the parameter `cycles`, or this path divided by the parameter `path`.
+    `length`, `height` and `force` are the units a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray
@@ -48,8 +48,8 @@ class Numbers:
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     """Return a list of indenters: one for every case, or a single one for all cases.
 
-    The list has a single element if all cases have the same indenter, or if only its numbers differ and it is a power
-    law, as for cones with different angles.
+    The list has a single element if all cases have the same indenter, or if only parameters of a power law vary, such
+    as the angle of a cone.
     """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
@@ -88,7 +88,7 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
-    """Return log-normal factors of mean 1, shape (cases, realisations). The parameter `name` is their scatter."""
+    """Return log-normal factors of mean 1 and standard deviation `name` (a parameter), shape (cases, realisations)."""
     width = np.sqrt(np.log1p(block.numbers(name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
 
@@ -202,7 +202,7 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
 
 
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
-    """Return a note if cases of a study will fail. This is judged with all random scatter set to zero."""
+    """Return a note if cases of a study will fail. Random scatter is ignored here."""
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)

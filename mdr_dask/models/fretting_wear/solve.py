@@ -109,7 +109,7 @@ def operations(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the operations of one solution of the wear equation and its errors, without the evaluation at each N."""
+    """Return the operations of one wear solution with its error estimate, without the evaluation at each N."""
     if hold == "force":
         return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
@@ -126,7 +126,7 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the name of a quantity of `Worn`, and whether the output `name` is the error of this quantity."""
+    """Return the quantity of `Worn` to which the output `name` belongs, and whether the output is its error."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
@@ -159,7 +159,7 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 def _is_plain(block: Block[FrettingWear]) -> bool:
     """Return whether closed forms give all requested outputs of a block.
 
-    Closed forms exist for power laws at constant depth without a load history, with the limit or the fast rule.
+    Closed forms exist for power laws at constant depth without a load history, with the wear rule `limit` or `fast`.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -261,7 +261,7 @@ def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatAr
         return ""
 
     def finite(name: str) -> FloatArray:
-        """Return an output as an array with one row. Infinite values, as for pressure at a sharp tip, become NaN."""
+        """Return an output as an array with one row. Infinite values, such as pressures at sharp tips, become NaN."""
         answer = np.asarray(_answer(records, name, places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
 

@@ -91,14 +91,14 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines in m with the spectra of measured surfaces. The realisations use the files of a surface in turn."""
+    """Two lines with the spectra of measured surfaces; heights in m. Realisations use a surface's files in turn."""
 
     surface_1: Surface
     surface_2: Surface
     perimeter: float
 
     def combined_rms(self) -> float:
-        """Return the rms height in m of the sum of the two lines, with squares averaged over the files of a surface."""
+        """Return the rms height in m of the sum of the two lines; mean squares are averaged over all files."""
         squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
         return float(np.sqrt(sum(squares)))
 
@@ -149,7 +149,7 @@ class Measured:
         return ""
 
     def combined_rms(self) -> float:
-        """Return the rms height of the sum of the two lines: in m, or a pure number if the lines are scaled."""
+        """Return the rms height of the sum of the two lines, in m; it is dimensionless if the lines are scaled."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:

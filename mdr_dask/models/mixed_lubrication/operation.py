@@ -34,8 +34,8 @@ class Operation:
     """The smooth contact, the film and the boundary layer of a case.
 
     `viscosity` is the dynamic viscosity in Pa s, `alpha` the pressure-viscosity coefficient in 1/Pa, and `width` the
-    width of the contact in m. `film_error` is the relative error of the film thickness. The heights of the lines are
-    divided by `scale` in m. `strength` is the strength of the boundary layer for heights that are divided by `scale`.
+    width of the contact in m. `film_error` is the relative error of the film thickness. The solver uses heights
+    that are divided by the length `scale`, in m; `strength` is the strength of the boundary layer for these heights.
     """
 
     case: MixedLubrication
@@ -67,7 +67,7 @@ class Operation:
 
     @property
     def squares(self) -> float:
-        """Number of independent squares across the rollers: their width divided by the longest wavelength."""
+        """Number of independent squares across the rollers: roller width divided by the longest wavelength."""
         return self.case.roller_width / self.case.longest()
 
     @property
@@ -118,8 +118,8 @@ def _shared_load(
 ) -> tuple[SharedLoad, float, str]:
     """Return the film thickness with the load shares, the relative error of the film thickness, and a warning.
 
-    The warning is empty unless asperities would carry more than the whole load at a given film thickness, or the case
-    is outside the range of the film formula.
+    The warning is empty unless the case is outside the range of the film formula, or the user gives a film thickness
+    at which asperities would carry more than the load.
     """
     pressure = _mean_pressure(case)
 
@@ -141,7 +141,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function and a warning. The function computes the film for a given share of the load on the film.
+    """Return a function and a warning. The function computes the film from the load share of the film.
 
     The warning is empty unless the case is outside the range of the film formula.
     """

@@ -85,7 +85,7 @@ def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> 
     """Return the scalar outputs of a realisation and their errors.
 
     `errors` contains the error of the probability and the error of the length in m. Conductance and resistance are
-    those of all independent squares across the rollers together; the squares conduct in parallel.
+    those of all independent squares across the rollers, connected in parallel.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()

@@ -133,7 +133,7 @@ def dimensions(file: DataFile) -> int:
 
 
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
-    """Return the length, in m, of the unit of the heights, and the spacings along x and y in m.
+    """Return the unit of the heights in m, such as 1e-6, and the spacings along x and y in m.
 
     The file or the user states the unit and the spacings. If only the unit of the positions is missing, it is found
     from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. A
@@ -257,7 +257,7 @@ def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
     """Return the heights of a grid file of Surfer or ESRI; return None for any other text.
 
     A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z; its rows have ascending y. An
-    ESRI text begins with lines of a name and a number, such as ``ncols 512``; its rows have descending y.
+    ESRI text begins with lines such as ``ncols 512``; its rows have descending y.
     """
     kind = {"dsaa": "Surfer", "ncols": "ESRI"}.get("".join(lines[:1]).casefold().partition(" ")[0].strip())
     if kind is None:
@@ -329,7 +329,8 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
         elif number and len(words) == 3 and words[0].casefold() in sides:
             key, points = sides[words[0].casefold()]
             found.setdefault(key, {})[f"{float(words[1]) / points} {words[2]}"] = line
-        elif not number and bool(along) != bool(upwards):  # a line that names both contains names of columns
+        # a line that names both a position and a height is a row of column names
+        elif not number and bool(along) != bool(upwards):
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line
@@ -365,7 +366,7 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
         rows = [line.rstrip(" ").removesuffix(separator) for line in rows]
     width = [len(line.split(separator)) for line in rows]
     common = max(set(width), key=width.count, default=0)
-    # lines of numbers above the table, which have another number of columns, are skipped
+    # skip lines of numbers above the table, which have fewer or more columns
     start = next((k for k, count in enumerate(width) if count == common), 0)
     odd = next((k for k in range(start, len(width)) if width[k] != common), None)
     first = lines.index(kept[numeric[0] + start]) if kept else 0

@@ -130,7 +130,7 @@ class Material(Parameters):
 def solid_of(material: Material) -> LinearSolid:
     """Return static modulus, Prony terms and dashpot of the material at its temperature.
 
-    Raise DataError or ValueError if the numbers do not describe a solid, or if the table cannot be fitted.
+    Raise DataError or ValueError if the parameters do not describe a solid, or if a table cannot be fitted.
     """
     from mdr_dask.physics import solids as rheology
 

@@ -23,7 +23,7 @@ from mdr_dask.units import shown
 #: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
-SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this count as equal
+SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this value count as equal
 #: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
 APART = 0.02
 

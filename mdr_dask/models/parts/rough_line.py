@@ -74,7 +74,7 @@ class OfSurface:
     is_random = True
 
     def height(self) -> float:
-        """Return the unit of height in m: the rms height, averaged over the lines of all files."""
+        """Return the unit of height in m: the rms height of the lines of all files together."""
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:

@@ -154,8 +154,8 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
     """Return the amplitudes, in m, of the lines that replace a surface in the method of dimensionality reduction (MDR).
 
-    There is one line for each file of the surface. Raise DataError if no wave of a line lies within the wavelengths of
-    its spectrum.
+    There is one line for each file of the surface. Raise DataError if a line has no wave within the range of its
+    spectrum.
     """
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):

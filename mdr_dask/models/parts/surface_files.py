@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-CUT_ERROR = 0.05  # assumed relative error of every point of a tabulated spectrum of straight profiles
-# A surface counts as isotropic if its anisotropy does not exceed this. The slopes along x and y then differ by at most
-# about a quarter.
+CUT_ERROR = 0.05  # assumed relative error of each point, if a table contains the spectrum of straight profiles
+# A surface counts as isotropic if its anisotropy does not exceed this value. The slopes along x and y then differ by at
+# most about a quarter.
 MOST_ANISOTROPY = 0.25
-STRIPES = 10.0  # waves along an axis count as stripes above this many times the mean power of equally long waves
+# A map has stripes if waves along x or y have more than this many times the mean power of all waves of equal length.
+STRIPES = 10.0
 FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of their mean square
 # If more than this fraction of the points lie far from their neighbours, these points belong to the surface and are not
 # outliers.
@@ -129,7 +130,7 @@ class MapFiles(HeightFiles):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with column names of a spectrum. A single name of one letter is not enough."""
+    """Return whether a text begins with column names of a spectrum. A single one-letter name is not enough."""
     try:
         sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
     except DataError:

@@ -119,7 +119,7 @@ def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray
     """Return the mean of several spectra at the wave numbers of the first one, and the relative standard error of the
     mean.
 
-    At each wave number, the mean includes only the spectra whose range contains this wave number. If it includes
+    At each wave number, the mean includes only the spectra whose range contains this wave number. If the mean includes
     only one spectrum, the standard error is NaN.
     """
     q = spectra[0].wavenumber

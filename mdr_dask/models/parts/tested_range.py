@@ -1,4 +1,4 @@
-"""Messages about cases with measured surfaces outside the range in which the method was tested (docs/validity.md)."""
+"""Messages about cases outside the range in which the method was tested for measured surfaces (docs/validity.md)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
         try:
             modulus = one.shear_modulus if one.material is None else solid_of(one.material).static_modulus
             height, force = OfSurface(one.surface, one.points, one.length).height(), one.largest_force()
-        except (DataError, ValueError):  # the solver reports the same problem for each case that has it
+        except (DataError, ValueError):  # the solver reports this problem for each of these cases
             continue
         loads.append(force / (4 * (modulus or np.inf) * one.length * height))
     largest = max(loads, default=0.0)

@@ -20,8 +20,8 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# grid points per point of the line on the finest grid that is usually needed: first for plane Kelvin bodies, then for
-# all other bodies
+# The finest grid that is usually needed has this many times the points of the line: the first number is for plane
+# Kelvin bodies, the second for all other bodies.
 USUAL_ON_PLANES, USUAL = 2, 16
 BYTES_A_NODE = 150  # peak memory in bytes per grid point, for a line and one case; 20 to 130 bytes were measured
 OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line

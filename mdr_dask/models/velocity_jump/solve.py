@@ -239,7 +239,7 @@ class _Followed(_Group):
             values = [friction[None], np.array([found.after]), found.depth[None], np.array([found.contact])]
             return Solution(values, np.array([found.outcome], np.int8))
 
-        # the error of a depth below the rms height (1 here) is divided by the rms height, not by the depth
+        # if a depth is below the rms height, which is 1 here, its error is divided by the rms height
         refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
