@@ -112,8 +112,7 @@ def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the ends of the 95 % intervals of means, shape (..., 2).
 
-    Along the last axis of `values` are `count` realisations and then, if it is known, the discretisation error of the
-    mean.
+    The last axis of `values` contains `count` realisations, and then the discretisation error of the mean, if known.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)

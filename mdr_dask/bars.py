@@ -121,8 +121,7 @@ def _write(line: str) -> None:
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
 
-    The remaining time counts down while no block ends; if the count reaches zero before the next block ends, the line
-    states no remaining time.
+    Until the next block ends, the remaining time counts down; after it reaches zero, it is not shown.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

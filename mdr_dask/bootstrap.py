@@ -103,14 +103,14 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum, over all groups, of the larger upward shift; `shifts` has two rows for each group."""
+    """Return the sum over all groups of the larger shift in the two rows of the group, or of 0 if both are negative."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack with new shifted rows; each shifts a group of neighbouring cases instead of a single case."""
+    """Return a stack with new shifted rows, in which groups of neighbouring cases are shifted, not single cases."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)
@@ -170,8 +170,8 @@ def scatter(residuals: FloatArray, count: int) -> float:
 def _caused(residuals: FloatArray, count: int) -> FloatArray:
     """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples.
 
-    The rms residuals that the errors of the groups cause are combined as the root of the sum of squares, because each
-    group affects other cases.
+    The rms residuals that the errors of the groups cause are combined as the root of the sum of squares, because
+    different groups affect different cases.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))

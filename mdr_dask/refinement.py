@@ -29,7 +29,7 @@ CHASED = 0.05
 FINEST = 2.0**-10
 #: Smallest number of values along an axis from which the output is predicted.
 FEWEST = 3
-#: A computed output is compared with its prediction only at values of this level or a higher level. The values of
+#: An interval can pass the test only if one of its ends is a value of this level or a higher level. The values of
 #: level 3 are the eighths of the axis. The outputs at the quarters (level 2) are predicted from only three values, and
 #: such a prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
 TESTED = 3
@@ -164,8 +164,8 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
     All needed cases of the mesh must have results. `means` contains the means of each output that has a tolerance. Also
-    return a number for each adaptive axis. It counts the combinations of non-adaptive values that still have intervals
-    to halve, but of which none can be halved.
+    return, for each adaptive axis, the number of combinations of non-adaptive values that still have intervals to
+    halve, although none of these intervals may be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:

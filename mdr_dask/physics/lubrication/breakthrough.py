@@ -63,7 +63,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
-    """Add the contribution of a cluster to the windows that contain only its head or only its tail.
+    """Add the contribution of a cluster to the windows that contain only its beginning or only its end.
 
     If `judged` is True, the part inside the window has to break the layer by itself; otherwise, the whole cluster has
     to break it. A part longer than `reach` cannot break the layer, whatever its shape.
@@ -139,7 +139,7 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
 
 
 def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
-    """Return, for the window that begins at each node, the length in intimate contact in whole parts (see `PARTS`).
+    """Return the length in intimate contact, in parts (see `PARTS`), of the window that begins at each node.
 
     `window` is the length of the window in spacings; the window must not be longer than the line. `rule` is one of
     `EDGE_RULES`. The fraction of windows with a length above zero is the breakthrough probability.
@@ -241,7 +241,7 @@ def _windows(
 
 
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
-    """Return the length in intimate contact of several windows, in whole parts (see `PARTS`).
+    """Return the length in intimate contact, in parts (see `PARTS`), of each window.
 
     `positions` holds the node of line 1 and the node of line 2 at the left edge of each window. Rolling with creep
     needs this function (see `creep_positions`); for pure rolling, :func:`contact_lengths` is faster. `window` is the
@@ -255,9 +255,9 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the nodes of line 1 and of line 2 nearest to the left edge of the window after each `travel`.
+    """Return the nodes of line 1 and of line 2 nearest to the left edge of the window after each distance `travel`.
 
-    `travel` is a distance in spacings, covered at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``,
+    `travel` is in spacings and is covered at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``,
     line 1 moves by ``1 + S/2`` times the travel, and line 2 by ``1 - S/2`` times the travel.
     """
     steps = np.asarray(travel, dtype=np.float64)

@@ -15,7 +15,7 @@ class Clusters(NamedTuple):
     """The clusters of a closed line, in the order in which they begin; lengths are in spacings of the nodes.
 
     If a cluster continues from the last node to the first, its `end` lies beyond the last node: on a line of 100 nodes,
-    a cluster from position 98 to position 3 ends at 103. `total` is the integral of ``z - h0`` over each cluster in m.
+    a cluster from position 98 to position 3 ends at 103. `total` is the integral of ``z - h0`` in m over each cluster.
     `overlap`, shape (points + 3,), contains the spline coefficients of ``z - h0`` in m: first the last coefficient of
     the line, then all coefficients, then the first two again. A cluster breaks the layer if
     ``total > limit (end - start)^3`` (thesis eq. 5.6), with `limit` in m. `closed` means that a single cluster covers

@@ -186,7 +186,7 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. This factor converts films from units of ``a^2/R`` to ``h/R``."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. A film in units of ``a^2/R``, times this factor, is ``h/R``."""
     return 8 * W / np.pi
 
 

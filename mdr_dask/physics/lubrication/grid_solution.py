@@ -17,7 +17,7 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 #: A second pressure maximum is a spike if it exceeds the pressure minimum between the two maxima by this fraction of
 #: the maximum pressure.
 _SPIKE = 0.01
-#: Number of nodes on either side of a position, through which the interpolating polynomial passes.
+#: The interpolating polynomial at a position passes through this number of nodes on each side of the position.
 _CUBIC, _QUINTIC = 2, 3
 #: If the film ends at a node, the computed pressure ends too far upstream by this fraction of a cell.
 _TOO_EARLY = 0.035
@@ -27,8 +27,8 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``. `spacing` is the distance between two neighbouring nodes times the density of
-    nodes at this place; the product is the same everywhere on the grid. The film that belongs to a piecewise linear
+    `central` is the film at ``X = 0``. `spacing` is the distance between two neighbouring nodes times the
+    density of nodes there; this product is the same everywhere on the grid. The film that belongs to a piecewise linear
     pressure is slightly too thin between the nodes, so :meth:`film_between` interpolates the films at the nodes.
     """
 
@@ -51,10 +51,10 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at the nodes of another grid, shifted so that its :attr:`front` lies at `front`.
+        """Return the pressure at other nodes, shifted so that its steep front moves from `self.front` to `front`.
 
-        The node before the new front gets the pressure half a cell before the old front, and the node behind the new
-        front the pressure half a cell behind the old front. These two pressures are nearly the same on a finer grid.
+        The last node upstream of the new front gets the pressure half a cell upstream of the old front, and the next
+        node the pressure half a cell downstream of it. These two pressures are nearly the same on a finer grid.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -97,9 +97,9 @@ class GridSolution:
 
     @property
     def resolves_spike(self) -> bool:
-        """Whether the pressure needs at least two cells behind the spike to fall by half of the height of the spike.
+        """Whether the pressure needs at least two cells downstream of the spike to fall by half of the spike's height.
 
-        The height is counted from the pressure minimum before the spike.
+        The height of the spike is counted from the pressure minimum upstream of the spike.
         """
         peak, lowest = self._spike
         behind = self.pressure[peak:]
@@ -107,7 +107,7 @@ class GridSolution:
 
     @cached_property
     def front(self) -> float:
-        """Position behind the spike at which the pressure equals the minimum before the spike; NaN without a spike.
+        """Position downstream of the spike at which the pressure equals the minimum before it; NaN without a spike.
 
         Unlike the pressure of the spike, this position hardly depends on where the nodes lie.
         """
@@ -119,8 +119,7 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """The index of the node of the spike, and the lowest pressure between the spike and the maximum before the
-        spike.
+        """The index of the node of the spike, and the lowest pressure between the last two pressure maxima.
 
         Both are 0 if there is no spike.
         """
@@ -148,7 +147,7 @@ class GridSolution:
 
 
 def cell_around(nodes: FloatArray, position: float) -> FloatArray:
-    """Return the last node before a position and the first node behind it."""
+    """Return the last node upstream of a position and the first node at or beyond it."""
     after = int(np.clip(np.searchsorted(nodes, position), 1, nodes.size - 1))
     return nodes[after - 1 : after + 1]
 
@@ -156,10 +155,10 @@ def cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return the expected value of a quantity on a grid with another spacing.
+    """Predict a quantity on a grid with another spacing from the solutions on earlier grids.
 
-    `reading` evaluates the quantity on one grid. If there are at least two solutions, the value is extrapolated from
-    the last two; the error of the quantity is taken as proportional to the square of the spacing.
+    `reading` evaluates the quantity on one grid. If there are at least two solutions, the quantity is extrapolated from
+    the last two, on the assumption that its error is proportional to the square of the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:
@@ -170,10 +169,10 @@ def expected(
 
 @jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
-    """Interpolate at each position by the polynomial through `sides` nodes before and `sides` nodes behind it."""
+    """Interpolate at each position by the polynomial through `sides` nodes on each side of the position."""
     result = np.empty(positions.size)
     for k in range(positions.size):
-        low, high = sides, nodes.size - sides  # bisection for the first node at or behind the position
+        low, high = sides, nodes.size - sides  # bisection for the first node at or beyond the position
         while low < high:
             middle = (low + high) // 2
             if nodes[middle] < positions[k]:

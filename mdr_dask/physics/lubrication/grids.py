@@ -52,10 +52,10 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float
 ) -> tuple[FloatArray, float]:
-    """Return about `count` nodes with a given density, and the product of their distance and the density.
+    """Return about `count` nodes with a given density, and the product of node spacing and density.
 
     The film ends at a node on every grid, so that errors on different grids can be compared. `front` is the position
-    behind a spike at which the pressure falls within one or two cells; it is NaN if there is no spike. The cells are
+    downstream of a spike at which the pressure falls within one or two cells; without a spike, it is NaN. The cells are
     made slightly wider or narrower until the front lies near the middle of a cell.
     """
     number = _cells(positions, density)
@@ -120,7 +120,7 @@ def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
     """Return the second derivative at the nodes from divided differences.
 
-    The first and the last node get the value of their neighbour.
+    The first and the last node get the result of the neighbouring node.
     """
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])

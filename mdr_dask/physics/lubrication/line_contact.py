@@ -119,7 +119,7 @@ def line_contact(
         if not (np.isfinite(value) and (value > 0 or (name == "G" and value == 0))):
             raise ValueError(f"expected a positive {name}, got {value!r}")
     if inlet is not None and not inlet < 0:
-        raise ValueError(f"expected an inlet upstream of the centre, in half widths and negative, got {inlet!r}")
+        raise ValueError(f"expected a negative inlet position (in half widths, upstream of the centre), got {inlet!r}")
     moes = moes_parameters(W, U, G)
     p0 = 2 * E_star * float(np.sqrt(W / (2 * np.pi)))
     pole = exponent = 0.0
@@ -167,8 +167,8 @@ class LineSolution:
     def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
         """Return a profile at ascending positions in half widths; `read` evaluates it on one grid.
 
-        The error at a position is the largest estimate within `REACH` cells, because an estimate vanishes where the
-        profiles of two grids intersect, and because their spikes and fronts lie at different positions.
+        The error at a position is the largest estimated error within `REACH` cells, because the estimate vanishes where
+        the profiles of two grids intersect, and because spikes and fronts lie at different positions on the two grids.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -190,8 +190,8 @@ class LineSolution:
     def spike(self) -> tuple[Estimate, Estimate]:
         """Return position (in half widths) and pressure (in p0) of the spike; NaN if there is no spike.
 
-        The values are those on the finest grid. If the pressure behind the spike falls within one cell, the pressure of
-        the spike depends on where the nodes lie, so its stated error is infinite.
+        The values are those on the finest grid. If the pressure downstream of the spike falls within one cell, the
+        pressure of the spike depends on where the nodes lie, so its stated error is infinite.
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
@@ -343,7 +343,6 @@ def solve_film(
 
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution) -> LineSolution:
-    """Return a solution without a film, with the reason."""
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g} on {failed.nodes.size} nodes: {why}"
     return LineSolution(case, outcome, reason, (), NO_ESTIMATE, NO_ESTIMATE)

@@ -21,14 +21,14 @@ _NEGLIGIBLE = 1e-9
 _LEAST_LOGARITHM = -256.0
 #: The film is accepted if the load shares add up to one within the tolerance times this factor.
 _BALANCE = 100.0
-#: Distances between the mean heights of two lines, in rms heights. At `_CLOSED`, the mean gap is about 1e-301. Beyond
-#: `_APART`, the mean overlap is less than the rounding error of the distance.
+#: Distances between the mean heights of two lines, in units of the rms height. At `_CLOSED`, the mean gap is about
+#: 1e-301. Beyond `_APART`, the mean overlap is less than the rounding error of the distance.
 _CLOSED = -37.0
 _APART = 9.0
 
 
 def mean_overlap(distance: float) -> float:
-    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z, in rms heights.
+    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z, in units of the rms height.
 
     z is the sum of the heights of two lines, and d is the distance between the mean heights of the lines.
     """
@@ -36,7 +36,7 @@ def mean_overlap(distance: float) -> float:
 
 
 def distance_of_means(gap: float) -> float:
-    """Return the distance d between the mean heights at which the mean gap ``<(d - z)+>`` is `gap`, in rms heights."""
+    """Return the distance d (see `mean_overlap`) at which the mean gap ``<(d - z)+>`` is `gap`; unit: rms height."""
     if gap > _APART:
         return gap
     if mean_overlap(-_CLOSED) >= gap:

@@ -88,7 +88,7 @@ class Liquid(NamedTuple):
 
 @jit
 def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
-    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in p0: Barus' law, or Roelands' law if z > 0."""
+    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in units of p0."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
     ratio = 1.0 + P / liquid.pole
@@ -125,7 +125,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 
 @jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of the values at the nodes f-1, f and f+1 in the value at the face between f and f+1.
+    """Return the weights of the nodes f-1, f and f+1 in an interpolated value halfway between f and f+1.
 
     The liquid flows from node f to node f+1.
     """

@@ -66,7 +66,7 @@ def solve_rows(
     stiffness: FloatArray,
     tied: FloatArray,
 ) -> tuple[Factors, Linear]:
-    """Return the Cholesky factors of the precision matrix, and the means and covariances that the density requires.
+    """Return the Cholesky factors of the precision matrix, and the means and covariances of the unknowns.
 
     At each point, `first` is the index of the first of the four splines that overlap there; `value` and `slope` are the
     values and derivatives of these four. `member` is the index of the offset of each point. `weight` is the precision
@@ -96,7 +96,7 @@ def solve_rows(
 
 
 def drawn(factors: Factors, normal: FloatArray) -> FloatArray:
-    """Transform standard normal numbers, shape (rows, unknowns), into random departures from the means."""
+    """Transform standard normal numbers, shape (rows, unknowns), into random deviations of the unknowns."""
     found = normal.copy()
     _back_substitute(*factors, found)
     return found
@@ -208,7 +208,7 @@ def _select(
     rough: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Compute the required entries of the covariance matrix. From these entries, compute the results at each point."""
+    """Compute the entries of the covariance matrix that the results in `Linear` need, and then these results."""
     rows, channels, splines, offsets = border.shape
     begin = channels * splines
     within = np.empty((splines, ORDER))  # the band of the covariance of a channel

@@ -29,9 +29,9 @@ class ShiftLaw:
 
     `name` is ``power``, ``arrhenius`` or ``wlf``. `constants` contains the value and the ends of the 95 % interval of
     ``exponent``, of ``activation_energy`` (J/mol), or of ``c1`` and ``c2`` (K) at the reference temperature. `factors`
-    returns the factors by the law, decades; they are zero at the anchor, the group whose measured factor is zero by
-    definition. `departures` are the measured factors minus those of the law, decades. `chance` is the probability that
-    the errors of the factors would cause departures at least as large if the law were exact.
+    returns the factors by the law in decades; they are zero at the anchor, the group whose measured factor is zero by
+    definition. `departures` are the measured factors minus those of the law, in decades. `chance` is the probability
+    that the errors of the factors would cause deviations at least as large if the law were exact.
     """
 
     name: str
@@ -42,7 +42,7 @@ class ShiftLaw:
 
     @property
     def residual(self) -> float:
-        """Root mean square of the departures, decades."""
+        """Root mean square of the deviations from the law, in decades."""
         return float(np.sqrt(np.mean(self.departures**2)))
 
 
@@ -69,8 +69,8 @@ def fit_wlf(
 ) -> ShiftLaw:
     """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)`` to temperatures in K.
 
-    The numbers c1 / c2 and 1 / c2 at the anchor are fitted, because they remain finite if the factors are linear in
-    temperature. For a reference that is higher than the anchor by dT, ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
+    First c1 / c2 and 1 / c2 are fitted with the anchor as reference; they remain finite if the factors are linear in
+    temperature. If the reference is higher by dT, the constants become ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
     straight = STRAIGHTEST / float(np.ptp(temperature))
@@ -137,8 +137,8 @@ def _fit(
     """Fit a law by generalised least squares.
 
     Return the law, in which `constants` is still empty; the values of the constants and their covariance; and the half
-    width of the interval of a constant in standard errors. If departures from the law exceed the errors of the factors,
-    an additional scatter is fitted, whose square is added to the variances of the factors.
+    width of an interval divided by the standard error. If deviations from the law exceed the errors of the factors, an
+    additional scatter is fitted, whose square is added to the variances of the factors.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size
@@ -160,7 +160,7 @@ def _fit(
         return least_squares(misfit, start, bounds=bounds, x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13)
 
     def excess(log_scatter: float) -> float:
-        """Return chi-squared divided by the degrees of freedom, minus 1."""
+        """Return the reduced chi-squared of the fit with an additional scatter, minus 1."""
         return float(2 * solved(np.exp(log_scatter)).cost / freedom - 1)
 
     found = solved(0.0)

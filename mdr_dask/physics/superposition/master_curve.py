@@ -91,17 +91,17 @@ class Superposition:
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of all factors, horizontal then vertical, decades squared, shape (2 groups, 2 groups)."""
+        """Covariance of all factors, horizontal then vertical, in decades squared, shape (2 groups, 2 groups)."""
         return np.atleast_2d(np.cov(self.draws, rowvar=False))
 
     @property
     def horizontal_error(self) -> FloatArray:
-        """Standard errors of the horizontal factors, decades."""
+        """Standard errors of the horizontal factors in decades."""
         return np.asarray(self.draws[:, : self.groups.size].std(axis=0), dtype=np.float64)
 
     @property
     def vertical_error(self) -> FloatArray:
-        """Standard errors of the vertical factors, decades."""
+        """Standard errors of the vertical factors in decades."""
         return np.asarray(self.draws[:, self.groups.size :].std(axis=0), dtype=np.float64)
 
     def interval(self, confidence: float = CONFIDENCE) -> FloatArray:
@@ -285,10 +285,10 @@ def rereference(
 ) -> Superposition:
     """Return the same master curve for a new reference, which is a group or a value between two groups.
 
-    The horizontal factor at the new reference is the factor of the law plus a departure. This departure is interpolated
-    linearly between the departures of the measured factors from the law at the two neighbouring groups. To include the
-    error of this interpolation (see `interpolation_error`), a normally distributed number, with this error as standard
-    deviation, is added to each draw.
+    The horizontal factor at the new reference is the factor of the law plus a deviation from the law, interpolated
+    linearly between the deviations of the measured factors at the two neighbouring groups. To include the error of this
+    interpolation (see `interpolation_error`), a normally distributed number, with this error as standard deviation, is
+    added to each draw.
 
     Parameters
     ----------

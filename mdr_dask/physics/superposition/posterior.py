@@ -7,7 +7,7 @@ Each channel c of a curve k (such as storage and loss modulus of one temperature
 with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline. The prior of its
 second differences is a normal distribution (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89), and so is the prior
 of the offsets. The density is integrated over spline coefficients and offsets in closed form; it depends only on the
-shifts and a few scales.
+shifts and a few scale parameters.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class Curves:
 
     The origin of `x` is such that the smallest ``x + shift`` is near zero. `member` is the index of the curve of each
     point, and `height` the median height of a curve in each channel. `splines` is the number of spline coefficients of
-    each channel. `offset` describes the prior of the standard deviation s of the vertical offsets: the median of s,
-    decades, and the standard deviation of ln s. It is None for curves without offsets. If `drifting` is True, the
+    each channel. `offset` describes the prior of the standard deviation s of the vertical offsets: the median of s
+    in decades, and the standard deviation of ln s. It is None for curves without offsets. If `drifting` is True, the
     offsets change from curve to curve by steps. A step is a mean step plus a scatter; the prior standard deviation of
     the mean step is `TREND` times that of the scatter.
     """
@@ -199,11 +199,11 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the index of the first of the four splines that overlap at each place, and values and slopes of all four.
+    """Return, at each position, the index of the first of the four splines there, and values and slopes of all four.
 
-    Places are in cells.
+    Positions are in units of cells.
     """
-    # in a diverged row, places may be NaN or infinite; such values must not become indices
+    # in a diverged row, positions may be NaN or infinite; such positions must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     slope = _SLOPES(inside)
@@ -211,7 +211,7 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
 
 
 def step_precision(count: int) -> FloatArray:
-    """Return the prior precision of the shifts, in widths of a curve. The first curve is not shifted."""
+    """Return the prior precision of the shifts, in units of the width of a curve, of all curves except the first."""
     steps = np.eye(count - 1) - np.eye(count - 1, k=-1)
     covariance = STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2
     return np.asarray(steps.T @ np.linalg.inv(covariance) @ steps, dtype=np.float64)

@@ -59,7 +59,7 @@ def first_guess(curves: Curves) -> FloatArray:
             rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
             rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
             channels = curves.y.shape[0]
-            # the best step may lie between two tried steps; the noise is at least the resulting error of the ordinate
+            # the best step may lie between two tried steps; the noise is at least as large as the resulting error of y
             coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
             noise = slice(1 + 2 * channels, 1 + 3 * channels)
             rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))

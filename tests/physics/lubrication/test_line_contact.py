@@ -170,7 +170,7 @@ def test_impossible_case_has_a_reason() -> None:
         ({"groups": (0.0, 1e-11, 5000.0)}, r"expected a positive W, got 0\.0"),
         ({"groups": (2e-5, -1.0, 5000.0)}, r"expected a positive U, got -1\.0"),
         ({"groups": (2e-5, 1e-11, np.inf)}, "expected a positive G, got inf"),
-        ({"inlet": 1.0}, "expected an inlet upstream"),
+        ({"inlet": 1.0}, "expected a negative inlet position"),
         ({"viscosity_law": "roelands"}, r"needs a viscosity above 6\.3e-5 Pa s, got None"),
         ({"viscosity_law": "ree"}, "expected the viscosity law barus or roelands, got 'ree'"),
     ],
