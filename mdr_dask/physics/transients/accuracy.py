@@ -1,10 +1,10 @@
 """Velocity jumps solved to a requested accuracy, with estimated errors.
 
 The steady states before and after a jump, and the drag just after the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The march is computed on one grid only. The steady state on the same grid is
-subtracted from it, and the difference is added to the accurate steady state. The transient is therefore accurate even
-if it is much smaller than the friction. The error of the transient is estimated by a second march with half as many
-nodes and half as many steps.
+(:mod:`mdr_dask.physics.refine`). The march is computed on one grid only. From drag and depth in the march, the steady
+values on the same grid are subtracted, and the accurate steady values are added. The transient is therefore accurate
+even if it is much smaller than the friction. The error of the transient is estimated by a second march with half as
+many nodes and half as many steps.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, 
 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
 ORDER = 2  # lower bound of the order of convergence of the steady states
-CAUTION = 2 * SAFETY  # safety factor of steady states; a contact of a few nodes changes irregularly from grid to grid
-# safety factor of a transient, which converges at first order because single asperities enter contact
+CAUTION = 2 * SAFETY  # safety factor for errors of steady states; a contact of a few nodes converges irregularly
+# safety factor for the error of a transient, which converges at first order because single asperities enter contact
 TRANSIENT = SAFETY
 
 
@@ -41,7 +41,7 @@ class Levels(NamedTuple):
 
     @classmethod
     def of(cls, limits: list[SteadyLimits]) -> Levels:
-        """Return the levels of all cases; `limits` contains the steady limits of each case."""
+        """Collect the four quantities of all cases; `limits` contains the steady limits of each case."""
         rows = [(each.before, each.at - each.before, each.after, each.depth[1]) for each in limits]
         return cls(*np.array(rows).reshape(-1, 4).T)
 
@@ -50,9 +50,9 @@ class Jumps(NamedTuple):
     """Results of the velocity jumps on a line.
 
     Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height. `trace`
-    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute; those of
-    `trace` and `depth` are NaN if they are not requested. `contact` is the fraction of the line in contact in steady
-    sliding, before or after the jump, whichever is larger.
+    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute; the errors of
+    `trace` and `depth` are NaN if not requested. `contact` is the fraction of the line in contact in steady sliding,
+    before or after the jump, whichever is larger.
     """
 
     levels: Levels
@@ -74,14 +74,14 @@ def solve_jumps(
     march: MarchRequest | None,
     with_errors: bool,
 ) -> Jumps:
-    """Return the velocity jumps on a line.
+    """Solve the velocity jumps on a line.
 
     Loads are F_N / (4 G L h), where h is the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2
-    tau / L. `accuracy` is the allowed relative error; the error of a depth below h is relative to h. If `accuracy` is
-    None, the steady states are solved on the grid of the march only, and no errors can be requested. `oversampling` is
-    the number of nodes per Nyquist point in the march, an even number; the steady states use at least as many. If
-    `march` is None, the transient is not computed. `with_errors` states whether the error of the transient is
-    estimated.
+    tau / L. `accuracy` is the allowed relative error; for a depth smaller than h, the error is divided by h. If
+    `accuracy` is None, the steady states are solved on the grid of the march only, and no errors can be requested.
+    `oversampling`, an even number, is the number of nodes per Nyquist point in the march; the steady states use at
+    least as many. If `march` is None, the transient is not computed. `with_errors` states whether the error of the
+    transient is estimated.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -136,7 +136,7 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and depth between two paths after each of the given times.
+    """Return the largest differences of drag and depth between two paths from each of the given times on.
 
     The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. If there
     is no path on the coarse grid, the differences are infinite.

@@ -60,7 +60,7 @@ SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
 ROUNDING = 1e-9  # margin for rounding errors, relative to a displacement
-CLOSE = 1e-9  # accuracy, in cells, of the place where free elements end a contact
+CLOSE = 1e-9  # largest last interval of the bisection for the place where contact ends, as a fraction of a cell
 FULL = -1  # returned if the arrays are too small for all patches, or if a patch extends beyond its run of cells
 DEPTH_CHANGES = 4.0  # assumed largest derivative of a displacement with respect to the last depth
 
@@ -82,10 +82,10 @@ class Reachable(NamedTuple):
 
 
 class SkipBounds(NamedTuple):
-    """For each cell out of contact: the cell can be skipped until the approach (see `_skip_free`) reaches `skip_until`.
+    """A cell without contact can be skipped until the approach (see `_skip_free`) reaches `skip_until` of the cell.
 
-    The entries of `state` are: approach so far, the largest entry of `skip_until`, and time, depth and largest drift at
-    the last search.
+    The entries of `state` are: the approach so far, the largest entry of `skip_until`, and time, depth and largest
+    drift at the last search.
     """
 
     skip_until: FloatArray
@@ -93,10 +93,10 @@ class SkipBounds(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Work arrays of a search, and its results: the patches, and the sums over the patches with their derivatives.
+    """Work arrays of a search, and the results: the patches, and the sums over the patches with their derivatives.
 
-    The entries of `scan` are: place where the current patch begins; place where contact last ended; place up to which
-    contact is certain; limit of the barrier (a cell in contact can be skipped if its barrier is below this limit);
+    The entries of `scan` are: place where the current patch begins; place where contact or a positive force last ended;
+    place up to which contact is certain; a limit (cells in contact with a barrier below this limit can be skipped);
     place up to which this limit is valid; and least displacement of free elements at the end of the previous cell. The
     barriers of the cells belong to the Deborah number after the jump.
     """
@@ -111,9 +111,9 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Workspace:
-    """Return a workspace for four times the given number of patches, plus 4096.
+    """Return a workspace that has space for 4 `patches` + 4096 patches.
 
-    For each cell, `below` is the increase of the depth up to which the cell certainly stays out of contact.
+    For each cell, `below` is the increase of the depth since the jump up to which the cell stays out of contact.
     """
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
@@ -189,7 +189,7 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     if motion.passes_top:
         work.skip.state[TIME] = np.nan  # bounds found in a repeated search are invalid at the next instant
         for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, PERIODS)):
-            for k in range(recovery.count[0]):  # from now on, the places found so far belong to the previous period
+            for k in range(recovery.count[0]):  # now the places of separation belong to the previous period
                 recovery.earliest[k] -= now.track.cells
                 recovery.place[k] -= now.track.cells
                 recovery.farthest[k] -= now.track.cells
@@ -253,8 +253,8 @@ def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
 def _search_period(search: Search, runs: IntArray) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
-    The places of separation that are stored in the workspace at the start belong to the previous period. If there are
-    none, the highest point is assumed to be in contact.
+    The places of separation that are stored in the workspace at the start belong to the previous period. Without such
+    places, only elements that have been free since before the jump can pass the highest point out of contact.
     """
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
@@ -327,8 +327,8 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
     """Search from cell i on, and return the first cell in which contact may begin.
 
     The displacement of free elements has a lower bound, computed along the line from the last known displacement and
-    the least drift. The *gap* is this bound minus the largest depth + h in the cell. If the gap is too wide to have
-    opened since the elements separated, there was a gap all the time; the cell is then skipped until the line has
+    the least drift. Here the *gap* is this bound minus the largest depth + h in the cell. If the gap is too wide to
+    have opened since the elements separated, there was a gap all the time; the cell is then skipped until the line has
     approached the elements by the width of the gap. The rate at which the gap closes is at most the rate of the depth
     plus the largest drift. The *approach* is the integral of this upper limit over time.
     """
@@ -411,8 +411,8 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
     """Find where contact ends in a cell beyond x; return two places and two flags.
 
     Contact ends at the first place; the search for the next contact starts at the second. The first flag is True if
-    free elements arrive that have a larger displacement than the line, the second if the force falls to zero. If
-    contact does not end in the cell, both flags are False.
+    free elements arrive with a displacement larger than depth + h, the second if the force falls to zero. If contact
+    does not end in the cell, both flags are False.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     place = NONE
@@ -428,7 +428,7 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
     if w >= _overtaking(search, scan[HELD], off, w) * (1 - ROUNDING):
         return off, off, False, by_force
     low, end = x, off
-    while end - low > CLOSE:  # bisection: free elements rise above the line between `low` and `end`
+    while end - low > CLOSE:  # bisection: u of free elements exceeds depth + h at `end`, but not at `low`
         middle = 0.5 * (low + end)
         if search.depth + height_at(now.track, middle)[0] < displacement_at(now, recovery, middle)[0]:
             end = middle
@@ -456,7 +456,7 @@ def _overtaking(search: Search, held: float, x: float, w: float) -> float:
 
 @jit_inline_uncounted
 def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
-    """Store the current patch, and write a lower bound of the displacement of the free elements behind it."""
+    """Store the current patch, and write a lower bound of the displacement of free elements one cell beyond it."""
     now, motion, work, scan = search.now, search.motion, search.work, search.work.scan
     if is_lost:
         _, slope, _, by_depth, opening = gap_at(now, work.recovery, end)
@@ -477,11 +477,11 @@ def _lowest_behind(search: Search, u: float) -> float:
 
 @jit_inline_uncounted
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
-    """Return whether contact begins beyond x in a cell, and the place where it begins.
+    """Return whether contact begins beyond x in a cell, and the place where contact begins or the search continues.
 
-    If it does not begin, return instead the place where the search continues. Contact can begin only between `low`,
-    where the force becomes positive, and `high`, where it falls to zero again. Elements may have separated near `high`
-    earlier, even if there is no contact now. If `ended` is True, contact or a positive force has just ended at x.
+    Contact can begin only between `low`, where the force becomes positive, and `high`, where the force falls to zero
+    again. Without contact, `high` is stored as a place of separation, because elements may have separated there at an
+    earlier instant. If `ended` is True, contact or a positive force has just ended at x.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
@@ -519,8 +519,8 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
 def _add_edge(search: Search, place: float, steep: float, by_depth: float, opening: float) -> None:
     """Add the changes of load and drag that are caused by the motion of one edge of a patch.
 
-    The force at this edge is not zero. The edge moves if the depth or the time changes. The gap is the height of the
-    line above the free elements. `steep` is the slope of the gap towards the inside of the patch, `by_depth` the
+    The force at this edge is not zero. The edge moves if the depth or the time changes. The gap is depth + h - u, with
+    the displacement u of free elements. `steep` is the slope of the gap towards the inside of the patch, `by_depth` the
     derivative of the gap with respect to the depth, and `opening` its derivative with respect to time.
     """
     sums = search.work.sums
@@ -555,7 +555,7 @@ def _add_separation(search: Search, place: float) -> None:
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add a cell in which elements may have separated earlier although the force is positive now."""
+    """Add a cell to `recovery`: elements may have separated in it earlier, although the force is positive now."""
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1

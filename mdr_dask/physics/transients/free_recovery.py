@@ -31,9 +31,9 @@ NEAR = 0.02
 STRIDE = 2.0  # longest step towards a place of separation, in cells
 # largest last step towards the place where contact begins, in cells; the error is about the cube of this step
 MET = 1e-3
-CREST = 1e-3  # accuracy, in cells, of the place where the gap between line and free elements is smallest
+CREST = 1e-3  # as a fraction of a cell: largest last interval of the search for the place of nearest approach
 FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
-MARGIN = 64.0  # number of cells that is added to twice a distance to find a window which is certainly long enough
+MARGIN = 64.0  # the bounds for a distance are those of a window of twice this distance plus MARGIN cells
 # cells travelled in the shortest window; number of windows, each twice as long as the previous one
 WINDOW, WINDOWS = 8.0, 16
 
@@ -58,8 +58,8 @@ class PathBounds(NamedTuple):
 
     During the shortest window the line travels `WINDOW` cells. Each further window is twice as long as the one before.
     `spread` is the range of the depth, `opened` the largest increase of the gap between line and free elements at one
-    place, and `least_lift` the least sum of depth and rate. `most_drift` (at least 0) and `least_drift` (at most 0) are
-    the extreme drifts of elements that separated within the window or have been free since before the jump.
+    place, and `least_lift` the least sum of the depth and its rate. `most_drift` (at least 0) and `least_drift` (at
+    most 0) are the extreme drifts of elements that separated within the window or have been free since before the jump.
     """
 
     spread: FloatArray
@@ -97,7 +97,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     if first.deborah > deborah:  # the drift of elements that have been free since before the jump is u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes this increase until half a window after the jump.
+    # passed earlier. `opened` includes the part of this increase in the window, up to half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k
@@ -171,8 +171,8 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
     """Return displacement, slope and du/d(depth) of an element at x that separated near a place.
 
     The place of separation is between `place`, where the force vanishes now, and `farthest`, the farthest place where
-    the force has vanished since the jump. The displacement is stationary there, so that few Newton steps are enough.
-    The returned displacement is -1 if the element did not separate between `place` and `farthest`.
+    the force has vanished since the jump. The displacement is stationary with respect to this place; few Newton steps
+    are enough. The returned displacement is -1 if the element did not separate between `place` and `farthest`.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -187,7 +187,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
         falls = (rate + change) / deborah + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
         if abs(step) < NEAR:
-            if s + step > x:  # the element at x has not reached that place yet
+            if s + step > x:  # the element at x has not reached the place of zero force yet
                 break
             fade = np.exp(-since)
             u = (d + h + 0.5 * force * step / deborah) * fade
@@ -271,9 +271,9 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
     """Return the gap at x, and its slope, curvature, derivative with respect to the depth, and rate.
 
-    The gap is the height of the line above free elements. At a fixed place x, the displacement of free elements changes
-    at the rate -u - D u'. For the curvature of the gap, this displacement is approximated by an exponential function
-    along the line.
+    The gap is depth + h - u, positive where the line is above free elements. At a fixed place x, the displacement of
+    free elements changes at the rate -u - D u'. For the curvature of the gap, this displacement is approximated by an
+    exponential function along the line.
     """
     u, u_slope, by_depth = displacement_at(now, recovery, x)
     last = now.history.count - 1
@@ -330,7 +330,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove each place of separation whose elements cannot have a displacement above `pressed` at x any more.
+    """Remove the places of separation from which elements at x certainly have displacements below `pressed`.
 
     `deepest` is the largest depth since the jump.
     """

@@ -1,4 +1,4 @@
-"""Steady sliding before and after a velocity jump on one line, and the instant at which the velocity changes."""
+"""Steady sliding on one line before and after a velocity jump, and the state just after the jump."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NEARLY = 1e-6  # largest relative error of the load before the last Newton step;
 class PreparedLine(NamedTuple):
     """One periodic line, prepared for the steady sweep and for the march.
 
-    `known` contains the barriers of recent Deborah numbers.
+    `known` contains the :class:`Barriers` for the last few Deborah numbers.
     """
 
     cells: Cells
@@ -46,7 +46,7 @@ class PreparedLine(NamedTuple):
 
     @classmethod
     def of(cls, line: CubicLine) -> PreparedLine:
-        """Prepare a line. The barriers of the line are computed later, when they are needed."""
+        """Prepare a line; its barriers are computed later, when they are needed."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
@@ -59,7 +59,7 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the patches in steady sliding at a depth of the highest point, and the sums of `sweep_cells`."""
+        """Return the patches in steady sliding, and the sums of `sweep_cells`; `depth` is that of the highest point."""
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
@@ -69,12 +69,12 @@ class PreparedLine(NamedTuple):
 class SteadyLimits(NamedTuple):
     """Steady states before and after a jump, and the state just after the jump.
 
-    `before` is the drag F_x / (4 G L) in steady sliding at v_1, `at` the drag just after the jump, and `after` the drag
-    in steady sliding at v_2, in the unit of height squared divided by the unit of length. Just after the jump, `rate`
-    is the derivative of the depth with respect to t / tau, and `tilt` is the derivative of the drag with respect to
-    `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values. `first` contains the contact
-    patches before the jump, and `slower` the patches in steady sliding at the lower of the two velocities; both are
-    None if one of the two steady states was not found.
+    `before`, `at` and `after` are the drag F_x / (4 G L) in steady sliding at v_1, just after the jump, and in steady
+    sliding at v_2. The unit of the drag is the unit of height squared divided by the unit of length. Just after the
+    jump, `rate` is the derivative of the depth with respect to t / tau, and `tilt` is the derivative of the drag with
+    respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values. `first` contains the
+    contact patches before the jump, and `slower` the patches in steady sliding at the lower of the two velocities; both
+    are None if one of the two steady states was not found.
     """
 
     before: float

@@ -52,7 +52,7 @@ class Stepping(NamedTuple):
 class Finish(NamedTuple):
     """Criterion for the end of a march: final depth and drag, and the allowed distances from these values.
 
-    `drag_distance` is a fraction of the largest difference from the final drag during the march.
+    `drag_distance` is a fraction of the largest difference between the drag and the final drag during the march.
     """
 
     depth: float

@@ -1,8 +1,8 @@
 """Contact patches on a line, and the forces on them.
 
-The unit of length is a cell of the line, and slopes are rises per cell. Times are in relaxation times. The Deborah
-number D is the distance v tau in cells. The lift is the sum of the depth and its rate, so that the force on an element
-in contact, divided by 4 G dx, is lift + h + D h'.
+The unit of length is a cell of the line, and slopes are rises per cell. Times are divided by the relaxation time. The
+Deborah number D is the distance v tau in cells. The lift is the sum of the depth and its rate, so that the force on an
+element in contact, divided by 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CLOSE = 1e-2  # largest last step towards a zero of the force, in cells; the err
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
-Cubic = tuple[float, float, float, float]  # coefficients of the height of the line in a cell, from the constant on
+Cubic = tuple[float, float, float, float]  # coefficients of the height of the line in a cell, constant first
 
 
 class Track(NamedTuple):
@@ -76,7 +76,7 @@ class History(NamedTuple):
 
 @jit_inline_uncounted
 def height_at(track: Track, x: float) -> tuple[float, float, float]:
-    """Return height, slope and curvature at x."""
+    """Return height, slope and curvature of the line at x."""
     i = min(max(int(x), 0), track.enter.size - 1)
     y = x - i
     c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
@@ -142,7 +142,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
         falls = q + x * (2 * r + x * 3 * c)
         step = -value / falls if falls < 0 else NONE
         if abs(step) < CLOSE:
-            bend = (r + 3 * c * x) / falls  # Halley's step
+            bend = (r + 3 * c * x) / falls  # step of Halley's method
             return min(max(x + step / (1 + bend * step) if abs(bend * step) < 0.5 else x + step, y), 1.0)
         x = x + step if low < x + step < high else 0.5 * (low + high)
     return x

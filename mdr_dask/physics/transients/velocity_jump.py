@@ -30,7 +30,7 @@ NEWTON = 0.2  # largest last Newton step of the depth, divided by the change of 
 # fraction is SETTLED or, if larger, OF_ACCURACY times the allowed error of the drag divided by the estimated transient.
 SETTLED = 0.04
 OF_ACCURACY = 0.1
-NEGLIGIBLE = 1e-5  # a smaller change of the steady depth is replaced by this fraction of the mean displacement
+NEGLIGIBLE = 1e-5  # least change of the steady depth that is used, divided by the mean displacement
 # the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
 # NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
 LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
@@ -61,8 +61,8 @@ class MarchRequest(NamedTuple):
 class Path(NamedTuple):
     """Drag and depth at the instants of a march, and their rates, shape (2, instants) each.
 
-    Times are in relaxation times from the jump on. The first rate of the drag is unknown and is NaN. `falls` is True if
-    the velocity falls.
+    Times since the jump are divided by the relaxation time. The first rate of the drag is unknown and is NaN. `falls`
+    is True if the velocity falls.
     """
 
     time: FloatArray
@@ -74,8 +74,8 @@ class Path(NamedTuple):
         """Return drag and depth at increasing times, shape (2, times).
 
         Between instants both are cubic in log(1 + t / t_1), where t_1 is the first instant after the jump. If the
-        velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) behind every
-        patch. After the last instant drag and depth are equal to the steady values in `after`.
+        velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) at the trailing
+        edge of every patch. After the last instant drag and depth are equal to the steady values in `after`.
         """
         power = 0.5 if self.falls else 1.0
         moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -168,7 +168,7 @@ class _Relaxation(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Change of the steady depth due to the jump; allowed errors of the depth are fractions of it."""
+        """Change of the steady depth due to the jump; allowed errors of the depth are fractions of this change."""
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
     @property
@@ -176,8 +176,8 @@ class _Relaxation(NamedTuple):
         """Sizes of the time steps.
 
         The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max at the speed
-        v_2, but at the latest after `ONSET` relaxation times. If the velocity falls, contact behind a patch grows at
-        the speed v_1 - v_2; this speed replaces v_2 if it is larger.
+        v_2, but at the latest after `ONSET` relaxation times. If the velocity falls, contact at the trailing edge of a
+        patch grows at the speed v_1 - v_2; this speed replaces v_2 if it is larger.
         """
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
@@ -191,8 +191,8 @@ class _Relaxation(NamedTuple):
     def transient(self) -> float:
         """Estimate the size of the transient, with a safety factor of two.
 
-        The drag may cross its steady value. Therefore the drag due to the rate of the depth just after the jump, and
-        the drag due to the change of depth, are added to the change of the drag after the jump.
+        As the drag may cross its steady value, three terms are added: the change of the drag after the jump, the drag
+        due to the rate of the depth just after the jump, and the drag due to the change of the depth.
         """
         _, sums = self.line.patches(self.ends[1], self.deborah[1])
         by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
@@ -262,7 +262,7 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)
     for k in range(slower.start.size):
-        first = int(slower.end[k]) + 1  # first node behind the patch
+        first = int(slower.end[k]) + 1  # first node beyond the patch
         last = int(np.ceil(slower.start[k + 1])) - 1 if k + 1 < slower.start.size else cells
         free = slower.pressed[k] * np.exp(-(first - slower.end[k]) / slower.deborah)
         for i in range(first, last):

@@ -37,9 +37,9 @@ class Foundation(NamedTuple):
 
 
 def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
-    """Return the foundation of a solid with G_m / G_inf, distinct tau_m, and eta / G_inf, in any unit of time.
+    """Return the foundation: `moduli` are G_m / G_inf, `times` the distinct tau_m, and `viscosity` is eta / G_inf.
 
-    For a Kelvin solid (no terms) the viscosity is 1 if the unit of time is tau.
+    The unit of time is arbitrary. For a Kelvin solid (no Prony terms) the viscosity is 1 if this unit is tau.
     """
     g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if g.size == 0 and not viscosity > 0:
@@ -132,7 +132,7 @@ def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
 def press(solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray) -> None:
     """Move an element from u0 to u1 at constant speed; its `terms` are overwritten.
 
-    The stretch u - a of a Prony term with the strain a is then A + B exp(-t / tau), with A = tau du/dt.
+    If a is the strain of the dashpot of a Prony term, u - a is then A + B exp(-t / tau), with A = tau du/dt.
     """
     if step <= 0:
         return

@@ -125,7 +125,7 @@ def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, sta
     """Move one element along the line at constant depth until its state repeats, and write the state of all elements.
 
     If the line has k times as many nodes as there are elements, every k-th node belongs to an element. Return whether
-    the state repeats, and the displacement at the end of the line.
+    the state repeats, and the displacement of the element at the end of the line.
     """
     n = line.height.size - 1
     every, step = n // state.displacement.size, 1 / (n * deborah)
@@ -180,7 +180,7 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
 
 MOST_STEPS = 400_000  # largest number of steps in one piece of a history
 # CELLS, PART and FIRST are divided by the number of steps per decade
-CELLS = 6.0  # largest travel in a step, cells
+CELLS = 6.0  # largest number of cells that the line travels in a step
 PART = 0.12  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
 FIRST = 0.012  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
 NEARLY = 1e-2  # a time step is left out if its end differs from a requested time by less than this fraction of the step
@@ -250,7 +250,7 @@ class Piece:
         count = max(int(np.ceil((span - late) / most)), 1)
         rest = late + (span - late) * np.arange(1, count + 1) / count
         moments: FloatArray = self.start + np.concatenate([[0.0], grown, rest])
-        moments[-1] = end  # the exact time, because the next piece begins at this time, and `end` may be requested
+        moments[-1] = end  # without rounding error: the next piece begins at `end`, and `end` may be requested
         return moments
 
 
@@ -310,7 +310,7 @@ def trace(
         state, depth, travel = part.state, float(part.depth[-1]), float(travel + way[-1])
     moment, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
     at, after = float(friction[0]), _end(line, solid, pieces[-1])
-    last = np.searchsorted(moment, times, side="right") - 1  # at a jump, the instant just after the jump
+    last = np.searchsorted(moment, times, side="right") - 1  # for the time of a jump, the instant just after it
     return Trace(first, at, after, friction[last], depths[last], float(contact.max()), Outcome.CONVERGED)
 
 
@@ -322,7 +322,6 @@ def _failed(times: FloatArray, outcome: Outcome) -> Trace:
 def _steady_friction(
     line: CubicLine, solid: Foundation, velocity: float, load: float, state: State, depth: float
 ) -> float:
-    """Return the friction in a steady state."""
     now = Schedule(np.zeros(1), np.zeros(1), np.array([velocity]), np.array([load]))
     return float(follow_line(line, solid, now, state, depth).drag[0]) / load
 

@@ -105,7 +105,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, j: int) -> float:
-    """Return the mean value in the cell before node j, from the cubic through the four nearest values."""
+    """Return the mean of the cubic through the four nearest `values` over the cell before node j."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
@@ -315,9 +315,9 @@ class StepWorkspace(NamedTuple):
 
     Heights (`under`) and slopes of the line belong to the end of the step, or, with the prefix `old_`, to its start.
     `after` is the displacement without contact at the end of the step. `parts` and `leaves` are results of
-    :func:`release`. `gaps` is the height of the line above the position that an element would have without contact;
-    without a dashpot, it contains the same numbers as `pulls`. `pulls` is the force of spring and Prony terms of an
-    element that follows the line, `force` its total force, and `power` the product of this force and the slope.
+    :func:`release`. `gaps` is depth + h minus the displacement that an element would have without contact; without a
+    dashpot, `gaps` is a copy of `pulls`. `pulls` is the force of spring and Prony terms of an element that follows the
+    line, `force` its total force, and `power` the product of this force and the slope.
     """
 
     under: FloatArray
