@@ -38,7 +38,10 @@ def names() -> tuple[str, ...]:
 
 
 def load(name: str) -> Model[Any]:
-    """Return the model `name`: one of `names`, or ``package.module:NAME``. Raise ModelError if there is none."""
+    """Return the model called `name`: one of `names`, or ``package.module:NAME``.
+
+    Raise ModelError if no model has this name.
+    """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
         return model

@@ -230,8 +230,8 @@ class Coordinate:
 class Block(Generic[P]):
     """Several cases, each with the same realisations. One Dask task computes them and writes one chunk of every array.
 
-    * `parameters`: a parameter set with the values of the fixed parameters. Its values of varied parameters are those
-    of an arbitrary case; `column` returns the values for all cases.
+    * `parameters`: a parameter set with the values of the fixed parameters. In this set, a varied parameter has
+    the value of an arbitrary case; `column` returns the values for all cases.
     * `columns`: for the dotted path of each varied parameter (such as ``velocity`` or ``indenter.angle``), an array
     with one value in SI units for each case.
     * `realisations`: indices of the realisations. An index and `seed` determine all random numbers of a
@@ -326,7 +326,8 @@ class Model(Generic[P]):
     * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
     * `distinct`: number of different solutions among the cases of a block, for ``check``; by default the number of
     cases.
-    * `units`: the unit of each output or parameter that is not in its declared unit, as in a dimensionless campaign.
+    * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
+    campaign.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
     * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets of the study, in
     which one axis at a time is varied. A nested parameter set can have its own method `notes`.

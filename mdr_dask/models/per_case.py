@@ -68,7 +68,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
 
 
 def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
-    """Solve a case. If it takes longer than the time limit, an alarm interrupts the solution."""
+    """Solve a case. If the solution takes longer than the time limit, an alarm interrupts it."""
     if time_limit is None:
         return solve(parameters, random)
     signal.setitimer(signal.ITIMER_REAL, time_limit)

@@ -31,8 +31,8 @@ class Numbers:
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
     stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
-    in sliding wear. `advance` is N divided by the parameter `cycles`, or this path divided by the parameter `path`.
-    `length`, `height` and `force` are the units a0, d0 and E* d0 a0.
+    in sliding wear. `advance` is N divided by the parameter `cycles`, or the dimensionless path divided by the
+    parameter `path`. `length`, `height` and `force` are the units a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray
@@ -88,7 +88,10 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
-    """Return log-normal factors of mean 1 and standard deviation `name` (a parameter), shape (cases, realisations)."""
+    """Return log-normal factors of mean 1, shape (cases, realisations).
+
+    Their standard deviation is the value of the parameter `name`.
+    """
     width = np.sqrt(np.log1p(block.numbers(name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
 

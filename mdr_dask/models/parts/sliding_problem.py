@@ -82,7 +82,10 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the Deborah numbers and loads of the different pairs, and for every member the index of its pair."""
+        """Find the different pairs of Deborah number and load among the cases `members`.
+
+        Return the Deborah numbers and the loads of these pairs, and for every case the index of its pair.
+        """
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
