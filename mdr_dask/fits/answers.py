@@ -48,7 +48,7 @@ def require_known(campaign: Campaign) -> None:
 def half_widths(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]
 ) -> dict[str, tuple[xr.DataArray, xr.DataArray]]:
-    """Return, for each series, a constant and the half width of its 95 % interval."""
+    """Return, for each series, the value of a constant and the half width of its 95 % interval."""
     found = {}
     for name, result in fit.results(groups).items():
         if constant not in result:
@@ -58,7 +58,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return which intervals are wider than the tolerance; False for an interval with an end that is not finite."""
+    """Return which intervals are wider than the tolerance; an interval with an infinite or NaN end counts as narrow."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -70,9 +70,9 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
     """Return, for each series, the half width that the interval of a constant would have without scatter.
 
-    This part is due to grid errors and to the misfit of the law. The fit is repeated with slightly less and slightly
-    more scatter, and each of the two half widths is extrapolated linearly to zero scatter. The smaller of the two
-    extrapolated values is used, because a half width jumps if the change of the scatter alters the verdict on the law.
+    The half width that remains is due to grid errors and to the misfit of the law. The fit is repeated with slightly
+    less and slightly more scatter, and each of the two half widths is extrapolated linearly to zero scatter. The
+    smaller extrapolated value is used, because a half width jumps if the new scatter alters the verdict on the law.
     """
     now = half_widths(fit, constant, groups)
 
@@ -157,16 +157,13 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return flags along the dimensions `dims`; a flag is set if any flag along the other dimensions is set."""
+    """Reduce flags to the dimensions `dims`: a flag is set if any of its flags along the other dimensions is set."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
-    """Return the shift of each output of every case.
-
-    The shifts have random signs and sizes, because equal shifts would cancel if a fit uses differences between cases.
-    """
+    """Return small random shifts for the outputs of all cases; equal shifts would cancel in differences of cases."""
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
     for key in _results(data):

@@ -18,13 +18,13 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: A law holds if the rms relative departure is at most this value, and the largest relative departure is at most twice
-#: this value.
+#: A law holds if the relative deviations of the data from the law are small: rms at most this value, and the largest
+#: deviation at most twice this value.
 WITHIN = 0.05
-#: A law holds approximately if the rms relative departure is at most this value, and the largest relative departure is
+#: A law holds approximately if the rms relative deviation is at most this value, and the largest relative deviation is
 #: at most twice this value.
 APPROXIMATE = 0.15
-#: Departures count against a law if scatter and errors alone would cause such departures with a probability below this.
+#: Deviations count against a law if scatter and errors alone would cause such deviations with a probability below this.
 DOUBTFUL = 0.05
 
 
@@ -54,7 +54,7 @@ class Fit:
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         """Fit a store, and return the results, indexed by the name of the series (``""`` for all series together).
 
-        FitError is raised only if no series has the necessary data.
+        FitError is raised only if no series can be fitted.
         """
         if not self.apart:
             return {"": _judged(self.compute(groups))}
@@ -127,8 +127,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p), which are exponents or logarithms of factors; `left` returns data
     minus law. If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by
-    the residuals, which widens the intervals. A constant is NaN if the data do not determine it (see `undetermined`),
-    near the fitted constants or near the `stated` constants.
+    the residuals, which widens the intervals. A constant is NaN if the function `undetermined` marks it, with the
+    derivatives of the law either at the fitted or at the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -146,9 +146,8 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine, from the derivatives of the law, shape (cases, p).
 
-    A constant is changed by 1, and the other constants are fitted again. If the law then changes by less than `WITHIN`
-    in every case, very different values of the constant fit equally well, because a departure below `WITHIN` does not
-    count against a law.
+    A constant is changed by 1, and the other constants are fitted again. If the values of the law then change by less
+    than `WITHIN` in every case, the constant is undetermined, because such small deviations do not count against a law.
     """
     largest = np.empty(effects.shape[1])
     for k in range(largest.size):
@@ -167,10 +166,10 @@ def verdict(
     *,
     excluded: bool = False,
 ) -> str:
-    """Return a sentence on whether a law holds, from a stack of the relative departures of the data from the law.
+    """Return a sentence on whether a law holds, from a stack of the relative deviations of the data from the law.
 
     `constants` is the number of constants fitted to these data. `where` describes a case in words. `excluded` means
-    that the interval of a fitted constant does not contain the stated value; the departures are then not due to
+    that the interval of a fitted constant does not contain the stated value; the deviations are then not due to
     scatter.
     """
     if residuals.shape[1] <= constants:
@@ -195,12 +194,12 @@ def short(number: float) -> str:
 def law_holds(
     departures: FloatArray, chance: float | None, constants: int = 0, where: str = "", scatter: float = 0.0
 ) -> str:
-    """Return a sentence on whether a law holds, from the relative departures of the data.
+    """Return a sentence on whether a law holds, from the relative deviations of the data.
 
-    `chance` is the probability that scatter and errors alone cause such departures. It is NaN if the probability is
-    unknown, and None if scatter and errors cannot cause the departures. `scatter` is the rms departure that scatter and
-    errors alone would exceed with a probability of 5 %. If scatter may hide departures above `WITHIN`, the verdict is
-    at best *approximately*. If scatter may hide departures above `APPROXIMATE`, the verdict is at best *not tested*.
+    `chance` is the probability that scatter and errors alone cause such deviations. It is NaN if the probability is
+    unknown, and None if scatter and errors cannot cause the deviations. With a probability of 5 %, scatter and errors
+    alone cause an rms deviation above `scatter`. The verdict is at best *approximately* if `scatter` exceeds `WITHIN`,
+    and at best *not tested* if `scatter` exceeds `APPROXIMATE`.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

@@ -27,7 +27,7 @@ from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
-#: Smallest possible error of measurement, as a fraction of the rms residual of the best prediction.
+#: Smallest possible measurement error, as a fraction of the rms residual of the best prediction.
 LEAST = 0.2
 #: Smallest rms residual, as a fraction of the rms measured value. Smaller residuals may be due to rounding.
 _ROUNDING = 1e-9
@@ -37,9 +37,9 @@ _ROUNDING = 1e-9
 class Calibration:
     """The result of a calibration.
 
-    `noises` are the possible errors of measurement, and `units` the units of unknowns, conditions and output. If the
-    errors of measurement in the table do not explain the residuals, `contradicted` contains these residuals. The
-    posterior then uses larger errors, so that the intervals include the misfit.
+    `noises` are the possible measurement errors, and `units` the units of unknowns, conditions and output. If the
+    measurement errors in the table do not explain the residuals, `contradicted` contains these residuals. The
+    posterior then uses larger measurement errors, so that the intervals include the misfit.
     """
 
     measured: Measured
@@ -125,12 +125,12 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     """Estimate the one to four unknowns of a grid study from measured points.
 
     The prior of an unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically. The
-    points are normally distributed. Their covariance has three parts: errors of measurement; scatter of the rough
-    lines, common to all points; and errors of grid and interpolation. One half of the last part is common to all
-    points, the other half is independent for each point.
+    measured values are assumed to be normally distributed about the prediction. Their covariance has three parts:
+    measurement errors; scatter of the rough lines, common to all points; and errors of grid and interpolation. Half of
+    each grid and interpolation error is common to all points, the other half is independent for each point.
 
-    If the table contains no errors of measurement, the size of these errors is unknown, and the logarithm of the size
-    has a uniform prior. The errors are then taken as either equal for all points, or proportional to the values.
+    If the table contains no measurement errors, the logarithm of their size has a uniform prior. The measurement errors
+    are then assumed to be either equal for all points, or proportional to the predicted values.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -153,9 +153,9 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
-    """Return possible errors of measurement, which are about as large as the residuals.
+    """Return possible measurement errors, which are about as large as the residuals.
 
-    One kind of error is equal for all points. If all values are positive, another kind is proportional to the values.
+    They are equal for all points or, if all measured values are positive, proportional to the predicted values.
     """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
@@ -183,9 +183,9 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 
 
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
-    """Return possible sizes of the error of measurement, from the rms residual of the best prediction.
+    """Return possible sizes of the measurement error, from the rms `residual` of the best prediction.
 
-    Given these residuals, the true error exceeds the largest size with a probability of 0.1 %.
+    The true error exceeds the largest size with a probability of 0.1 % (more if the limit of 100 residuals applies).
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -215,7 +215,7 @@ def measured_of(dataset: xr.Dataset) -> Measured:
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:
-    """Return the groups of a study with another table of measured points, given as a path or a pandas DataFrame."""
+    """Return the series of a study with another table of measured points, given as a path or a pandas DataFrame."""
     if hasattr(table, "to_csv"):
         named = {"name": "measured", "text": table.to_csv(index=False)}
     else:
@@ -274,7 +274,7 @@ def summary(found: Calibration) -> xr.Dataset:
 
 
 def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
-    """Return the weighted median and the ends of the 95 % and 68 % intervals."""
+    """Return the median and the ends of the 95 % and 68 % intervals of weighted values, indexed by suffix."""
     return dict(
         zip(
             identifiability.ENDS,
@@ -285,7 +285,7 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of unknown `k`.
+    """Return the ends of the one-sided interval of unknown `k`.
 
     The result is empty unless `k` is the only undetermined unknown and exactly one end of its axis is open.
     """
@@ -328,10 +328,7 @@ def sentence(found: Calibration) -> str:
 
 
 def _cut(found: Calibration) -> str:
-    """Return a text that names the determined unknowns whose interval is cut off by an end of the axis.
-
-    For the criterion see `identifiability.CUT`.
-    """
+    """Return a text that names the determined unknowns whose axis cuts off the interval (`identifiability.CUT`)."""
     is_high = identifiability.at_ends(found.posterior) > -identifiability.CUT
     cut = [
         f"{name} at {shown(float(axis[end]), found.units[name])}"

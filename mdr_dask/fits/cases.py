@@ -30,7 +30,7 @@ def each(
     """Fit a law to the cases along some dimensions, for each combination of values along the other dimensions.
 
     The function `inner` returns the dimensions along which one fit combines the cases. The fit needs all of `outputs`.
-    The first of them must have no dimensions except the axes of the study and ``realisation``.
+    The first output must have no dimensions except the axes of the study and ``realisation``.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -56,7 +56,7 @@ def dimensions(data: xr.Dataset, *names: str) -> list[str]:
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return a parameter that is equal in all cases; raise FitError if the parameter is missing or varies."""
+    """Return the value of a parameter that is equal in all cases; raise FitError if it is missing or varies."""
     require(data, name)
     values = data[name]
     if values.size != 1:
@@ -67,7 +67,7 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 class Table(NamedTuple):
-    """Values of an output and the errors of the values, shape (cases, realisations), both divided by a scale.
+    """Values of an output and their discretisation errors, shape (cases, realisations), both divided by a scale.
 
     `columns` contains further numbers of each case, such as the load and the velocity.
     """
@@ -170,15 +170,15 @@ def nonlinear(
     sentence = verdict(rest, count, 0, where, excluded=excluded)
     errors: Variables = {}
     for end, which, left in (("", "fitted", found.residuals[0]), ("_stated", "stated", rest[0])):
-        errors |= measure(f"rms_error{end}", rms(left), f"rms relative departure with the {which} constants")
+        errors |= measure(f"rms_error{end}", rms(left), f"rms relative deviation with the {which} constants")
         errors |= measure(
-            f"largest_error{end}", float(np.abs(left).max()), f"largest relative departure with the {which} constants"
+            f"largest_error{end}", float(np.abs(left).max()), f"largest relative deviation with the {which} constants"
         )
     return found, errors | holds(sentence, found.holds(where))
 
 
 def rms(left: FloatArray) -> float:
-    """Return the root mean square."""
+    """Return the root mean square of the residuals `left`."""
     return float(np.sqrt(np.mean(left**2)))
 
 

@@ -18,16 +18,16 @@ from mdr_dask.units import conversion
 
 DEGREES = range(1, 7)  # degrees of the polynomials that are fitted to each curve, in order to estimate the scatter
 HOLDS = {"yes", "approximately"}
-LOG = float(np.log(10.0))  # factor that converts a small departure in decades into a relative departure
+LOG = float(np.log(10.0))  # factor that converts a small deviation in decades into a relative deviation
 
 
 def laws_of(
     result: Superposition, over: str, unit: str, reference: float, *, is_temperature: bool
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
-    """Fit the laws that suit the groups, and return with each law a sentence on whether it holds.
+    """Fit laws of the shift factors, and return for each law a sentence on whether the law holds.
 
-    If the groups are velocities, the law is a power law of the shift factors. If the groups are temperatures, the laws
-    are Arrhenius' law and the WLF law of log10 a_T. All laws are fitted relative to the middle group, so that the fit
+    If the groups are velocities, the law is a power law. If the groups are temperatures, the laws are Arrhenius' law
+    and the WLF law of log10 a_T. All laws are fitted relative to the middle group, so that the fit
     does not depend on the reference.
     """
     size, anchor = result.groups.size, result.groups.size // 2
@@ -66,8 +66,8 @@ def sign_of(over: str) -> int:
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
     """Return temperatures in K.
 
-    Temperatures without a unit count as K if the median of `groups` exceeds 250, otherwise as degC. Without `groups`,
-    the median of the temperatures themselves is used.
+    Without a unit, the temperatures count as K if the median of the temperatures `groups` exceeds 250, otherwise as
+    degC. If `groups` is None, the median of `temperatures` is used.
     """
     if unit in ("", "1", "-"):
         unit = "K" if np.median(temperatures if groups is None else groups) > 250 else "degC"
@@ -76,7 +76,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
 
 
 def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
-    """Return the constants of laws with their intervals, and the rms distance of the shift factors from each law."""
+    """Return the constants of the laws, the intervals of the constants, and the rms distance from each law."""
     units = {"activation_energy": "J/mol", "c2": "K"}
     meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
     found = {}
@@ -145,10 +145,9 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 def _scatter(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> tuple[float, float, int]:
-    """Return Schwarz's criterion, the sum of squared residuals, and the degrees of freedom.
+    """Fit a polynomial to each curve; return Schwarz's criterion, the sum of squares and the degrees of freedom.
 
-    The residuals are the distances of the points of each curve from a polynomial fitted to this curve. The criterion is
-    used to select the degree of the polynomials.
+    The degree with the smallest criterion is used.
     """
     squares, freedom = 0.0, 0
     for places in members:

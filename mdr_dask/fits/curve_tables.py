@@ -25,7 +25,7 @@ LEAST_JUMP = 3.0
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of numbers with a row of names and an optional row of units, stored in ``attrs["units"]``."""
+    """Read a table of numbers below a row of names. If there is a row of units, ``attrs["units"]`` contains them."""
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
@@ -65,9 +65,9 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column with the wanted name, or else the first column whose name is a synonym, or None.
+    """Return the column with the wanted name. If there is none, return the first column whose name is a synonym.
 
-    The result is also None if several columns have synonyms as names and their values differ.
+    Return None if there is no such column, or if there are several and their values differ.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -77,7 +77,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
 
 def _agree(one: pd.Series, other: pd.Series) -> bool:
-    """Return whether two columns differ only by a constant factor or difference, as if they had different units."""
+    """Return whether two columns may be one quantity in two units: their ratio or their difference is constant."""
     first, second = one.to_numpy(dtype=np.float64), other.to_numpy(dtype=np.float64)
     with np.errstate(all="ignore"):
         return any(np.ptp(each) <= AGREE * abs(np.median(each)) for each in (second / first, second - first))
@@ -103,7 +103,7 @@ FAMILIES = (
     ("frequency", ("compliance",), "temperature"),
     ("time", ("compliance",), "temperature"),
 )
-"""Abscissa, ordinates and group of tables that need no options. The first family that fits a table is used."""
+"""Abscissa, ordinates and group that are found without options. The first family that fits a table is used."""
 
 
 def columns_to_use(
@@ -144,7 +144,7 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return the kind of vertical factors for these columns; columns are recognised by name or unit.
+    """Return which vertical factors suit these columns; columns are recognised by name or unit.
 
     The kinds ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group. In all
     other cases, the kind is ``none``.
@@ -162,7 +162,7 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return the column of a second parameter (velocity or temperature) in which the curves differ, or None."""
+    """Return the column of a further velocity or temperature in which the curves differ; None if there is none."""
     found = None
     for name in ("normal_force", "velocity", "temperature"):
         column = column_of(frame, name)
@@ -176,7 +176,7 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the group of each curve, and log10 of the abscissae and of the ordinates, shape (channels, points)."""
+    """Return the value of `by` of each curve, and log10 of its abscissae and ordinates, shape (ordinates, points)."""
     rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
     if rows.size == 0 or np.any(rows <= 0):
         names = " and ".join(repr(name) for name in (over, *ordinates))
@@ -191,7 +191,7 @@ def curves_of(
 def pairs_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: tuple[str, str]
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the values of both groups, shape (curves, 2), and the points of all curves as in `curves_of`."""
+    """Return the values of both columns `by`, shape (curves, 2), and the points of all curves as in `curves_of`."""
     labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
     keys, curves = [], []
     for pair in sorted(set(map(tuple, labels.T))):
@@ -210,11 +210,11 @@ def pairs_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Divide measured values, which scatter about a few set values, into groups; return the group of each value.
+    """Divide measured values, which scatter about a few set values, into groups; return each value's group index.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. There is one exception: neighbouring values that alternate within one
-    sweep of the abscissa are rounded readings of one set value, and form one group.
+    each distinct value is a group of its own. There is one exception: close values that alternate within one sweep of
+    the abscissa are rounded readings of one set value, and form one group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

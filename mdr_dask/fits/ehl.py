@@ -54,8 +54,8 @@ def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
     W, U and G are called groups. An exponent is NaN if its group does not vary, or if its group is proportional to a
-    product of powers of the other two groups. Computed films have no scatter; therefore the intervals follow from the
-    misfit. ``law_holds`` is about the formula of Pan and Hamrock.
+    product of powers of the other two groups. Computed film thicknesses have no scatter; therefore the intervals follow
+    from the misfit. ``law_holds`` is about the formula of Pan and Hamrock.
     """
     found: Variables = {}
     departures, of_stated = [], []
@@ -69,8 +69,8 @@ def _films(data: xr.Dataset) -> Variables:
             for end, value in ends.items():
                 about = f"exponent of {_GROUPS[name]} in h/R" if k else "factor of the power law for h/R"
                 found |= measure(f"{film}_{name}{end}", float(value[k] if k else np.exp(value[k])), about)
-        found |= measure(f"{film}_rms", rms(residuals), "rms relative departure from the fitted formula")
-        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative departure from it")
+        found |= measure(f"{film}_rms", rms(residuals), "rms relative deviation from the fitted formula")
+        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative deviation from it")
         departures.append(residuals)
         of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
     sentences = (law_holds(np.concatenate(each), None) for each in (of_stated, departures))

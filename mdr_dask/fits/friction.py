@@ -47,7 +47,7 @@ NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the rms slope of the line, from the store or from the spectrum; NaN for a smooth line."""
+    """Return the rms slope of the line, from the store or from its spectrum; NaN for a smooth line."""
     if "rms_slope" in data:
         stored = data["rms_slope"].mean("realisation")
         return stored.where(stored > 0)
@@ -95,8 +95,8 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
 
-    The index is not always 0: with the time stepping of the original papers, friction at very low velocities is too
-    large, because it does not fall below a spurious limit.
+    The index is not always 0: with the time stepping of the original papers, friction does not fall below a spurious
+    limit and is therefore too large at very low velocities.
     """
     if velocity.size == 1:
         return 0
@@ -138,14 +138,14 @@ def _zone_one(data: xr.Dataset) -> Variables:
         **constant("alpha", -found.constants[:, 0], count, "exponent alpha of the law of zone 1"),
         **measure("alpha_stated", stated, "alpha = H / (1 + H) by eq. 3.13"),
         **constant("beta", np.exp(found.constants[:, 1]), count, "factor beta of the law of zone 1", positive=True),
-        **measure("rms_error", found.rms, "rms relative departure from the law with the fitted constants"),
+        **measure("rms_error", found.rms, "rms relative deviation from the law with the fitted constants"),
         **measure("loads", len(used), "number of loads in zone 1"),
         **holds(stated_power(x, logs, -stated, count, where), found.holds(where)),
     }
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Compare the largest friction over all velocities with the rms slope of the line and with that in contact."""
+    """Compare the largest friction over all velocities with the rms slope of the line and the rms slope in contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -174,10 +174,10 @@ def _plateau(data: xr.Dataset) -> Variables:
 
 
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
-    """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
+    """Test whether mu is sqrt 2 times the rms slope in contact (eq. 3.15), or sqrt 2 times the rms slope of the line.
 
-    `height` is a stack of the ratio of the largest mu to the rms slope of the line. `flat` contains the indices of the
-    cases on the plateau.
+    `height` is a stack of the largest mu divided by the rms slope of the line. `flat` contains the indices of the cases
+    on the plateau.
     """
     meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:
@@ -198,10 +198,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return the velocities, and a format for the text that describes a velocity.
-
-    The velocities are dimensionless; if the study has no rms height, they are v tau in m.
-    """
+    """Return dimensionless velocities, or v tau in m if the study has no rms height; also a format string for them."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
@@ -210,7 +207,7 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    `x` contains the logarithms of the velocities, and `ends` the ends of the interval of the slope `found.rise`.
+    `x` contains the logarithms of the velocities, and `ends` both ends of the interval of the slope `found.rise`.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"

@@ -11,14 +11,14 @@ import numpy as np
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: An end of the axis of an unknown is *open* if ln(posterior density) at this end is less than `OPEN` below the maximum
-#: of ln(posterior density). For a normal density, an open end lies within two standard errors of the maximum.
+#: An end of the axis of an unknown is *open* if ln(largest posterior density / density at the end) is less than `OPEN`.
+#: For a normal density, an open end lies within two standard errors of the maximum.
 OPEN = 2.0
 #: The axis cuts off the 95 % interval of an unknown if the density at an end of the axis exceeds 5 % of the maximum.
 CUT = float(np.log(20))
 #: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
-#: The data determine a product if the spread of its logarithm is less than this fraction of the spread without data.
+#: The data determine a product if the spread of its logarithm is less than this fraction of the spread in the prior.
 NARROW = 0.25
 #: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
 #: at most this factor.
@@ -26,7 +26,7 @@ ROUNDED = 1.15
 #: Probability of each interval. The keys are the suffixes of the ends: ``x_low``, ``x_high``; ``x_low_68``,
 #: ``x_high_68``.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: Suffixes of the names of the median and of the ends of the intervals, and the cumulative probability at each.
+#: `ENDS`: suffixes of the median and of the ends of the intervals. `SHARES`: cumulative probability at each of them.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -60,9 +60,9 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns that the data determine, such as ``relaxation_time x rms_roughness^2``.
+    """A product of powers of unknowns, determined by the data, such as ``relaxation_time x rms_roughness^2``.
 
-    `values` contains the product in each cell of the posterior.
+    `values` contains the value of the product in each cell of the posterior.
     """
 
     exponents: FloatArray
@@ -103,7 +103,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return the product with exponents rounded to simple fractions, if that hardly increases its spread."""
+    """Return the product of powers; its exponents are rounded to simple fractions if `ROUNDED` allows it."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator
@@ -146,7 +146,7 @@ def unit_of(units: Sequence[str], exponents: FloatArray) -> str:
 
 
 def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
-    """Return quantiles of weighted values, interpolated linearly."""
+    """Return the quantiles of weighted values at the cumulative probabilities `shares`, interpolated linearly."""
     places, which = np.unique(values, return_inverse=True)
     mass: FloatArray = np.bincount(which.ravel(), weights).astype(np.float64)
     below = np.cumsum(mass) - mass / 2

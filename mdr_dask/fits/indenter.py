@@ -24,7 +24,7 @@ BODY = 0.3
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return c and n of the profile c |x|^n that replaces the indenter in the method of dimensionality reduction."""
+    """Return c and n of the profile c |x|^n by which the method of dimensionality reduction replaces the indenter."""
     if "indenter_angle" in data.coords:
         return shapes.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
     if "indenter_radius" in data.coords:
@@ -59,8 +59,8 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The indenter must be flat compared with the roughness, and be pressed in by at least the rms height. The velocity
-    must not exceed the velocity at which friction is largest.
+    The indenter must be much less steep than the roughness (`BODY`), and be pressed in by at least the rms height. The
+    velocity must not exceed the velocity at which friction is largest.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)

@@ -17,8 +17,8 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.units import shown_apart
 
-#: `LARGEST`: largest number of values of a table. `PIECES`: largest number of pieces into which an interval between two
-#: computed values is divided.
+#: `LARGEST`: largest number of values in a table. `PIECES`: largest number of steps into which the interval between
+#: two computed values of an axis is divided.
 LARGEST, PIECES = 2_000_000, 16
 
 
@@ -26,7 +26,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
 
     The mean over realisations is interpolated by monotone cubics (PCHIP) along one axis after the other. Each axis is
-    linear or logarithmic, as `Scale.of` chooses for its values. An axis of words, or an axis with fewer than `FEWEST`
+    linear or logarithmic, as `Scale.of` chooses. An axis of words, or an axis with fewer than `FEWEST`
     numbers, receives no new values. The error is the half width of the 95 % interval of the mean plus the error of
     interpolation, which is estimated by leaving out every second value.
     """
@@ -61,7 +61,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output, and the half width of the interval of the mean.
+    """Return the mean of an output over the realisations, and the half width of the 95 % interval of the mean.
 
     Where the interval is unknown, the discretisation error replaces the half width.
     """
@@ -90,7 +90,7 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
     """
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
-    for axis in axes * 2:  # twice, because a value filled along one axis is used along the others
+    for axis in axes * 2:  # twice: values interpolated along a later axis allow more along an earlier one
         places = mean[mean.dims[axis]].to_numpy()
         lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
         for case in np.ndindex(lines.shape[:-1]):
@@ -101,10 +101,10 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the values along an axis after missing values were interpolated, and the errors of all values."""
+    """Interpolate the missing values along an axis; return all values and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    # without the factor LEFT: the gap at a missing value is as wide as the gaps in the test of `left_out_error`
+    # undo the factor LEFT: here, the gap at a missing value is as wide as the gaps that `left_out_error` tests
     left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])

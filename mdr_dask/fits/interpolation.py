@@ -8,9 +8,9 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Smallest number of values along an axis; every second of these values must still determine a curve.
+#: Smallest number of values along an axis; if every second value is left out, the others must still determine a curve.
 FEWEST = 4
-#: Ratio of two errors of interpolation: with all values, and with every second value only. The ratio is 1/4 for an
+#: Error of interpolation with all values, divided by the error with every second value only. The ratio is 1/4 for an
 #: error of second order; at a kink it would be 1/2.
 LEFT = 0.25
 
@@ -23,10 +23,10 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale for some numbers; it is linear if a number is not positive.
+        """Return the scale for some numbers; it is linear if any number is zero or negative.
 
-        If `spread` is True, the scale is logarithmic if the numbers span more than a decade. If `spread` is False, the
-        numbers must ascend, and the scale is the one on which the numbers are more evenly spaced.
+        With `spread`, the scale is logarithmic if the numbers span more than a decade. Without `spread`, the numbers
+        must ascend, and the scale is the one on which the numbers are more evenly spaced.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -46,9 +46,9 @@ class Scale:
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Divide each interval between neighbouring places on an axis into equal pieces; return all old and new places.
+    """Divide each interval between neighbouring values of an axis into equal steps; return all given and new values.
 
-    The pieces are equal on the scale that `Scale.of` chooses for the old places.
+    The steps are equal on the scale that `Scale.of` chooses for the given values `places`.
     """
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
@@ -79,10 +79,10 @@ def linear(
 
 
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
-    """Estimate the error of interpolation at every place of an axis by leaving out every second value.
+    """Estimate the error of interpolation at every value of an axis (`places`) by leaving out every second value.
 
-    `table` contains numbers converted to `scale`; the result is the error of the numbers before this conversion. The
-    error at a place is the largest of the estimates at this place and at its two neighbours.
+    `table` contains numbers converted to `scale`; the result is the error of the numbers before this conversion. Each
+    error is the largest of three estimates: the one at the value itself and those at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)

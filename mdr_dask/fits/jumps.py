@@ -76,9 +76,9 @@ def each_jump(
 
 
 class Jumps(NamedTuple):
-    """Stacks of mu_1, d_mu_0 and mu_2, shape (rows, cases), and dv / v_1 (`change`) of some cases.
+    """Stacks of mu_1, d_mu_0 and mu_2, shape (rows, cases); `change` is dv / v_1 of each case.
 
-    The rms slope is NaN for smooth lines. `counts` contains the number of successful realisations of each case.
+    `slope`, the rms slope, is NaN for smooth lines. `counts` is the number of successful realisations of each case.
     """
 
     before: FloatArray
@@ -89,11 +89,11 @@ class Jumps(NamedTuple):
     counts: NDArray[np.intp]
 
     def count(self, used: NDArray[np.bool_]) -> int:
-        """Return the smallest number of successful realisations among some cases."""
+        """Return the smallest number of successful realisations of the `used` cases."""
         return int(self.counts[used].min(initial=np.iinfo(np.intp).max))
 
     def numbers(self) -> dict[str, FloatArray]:
-        """Return the stacks of all `NUMBERS`, indexed by name; zeta and xi are infinite or NaN where mu_1 is 0."""
+        """Return the stacks of all `NUMBERS`, indexed by name; zeta and xi are infinite or NaN if mu_1 is 0."""
         before, jump, after, change, slope, _ = self
         logarithm = np.log1p(change)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -125,7 +125,7 @@ def jumps_of(data: xr.Dataset) -> Jumps:
 
 
 def _kinetics(case: xr.Dataset) -> Variables:
-    """Return the `NUMBERS` of a case, and the interval of each number."""
+    """Return the quantities `NUMBERS` of a case, each with its interval."""
     jumps = jumps_of(case)
     found: Variables = {}
     for name, stack in jumps.numbers().items():
@@ -140,7 +140,7 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 
 
 def _jump_law(data: xr.Dataset) -> Variables:
-    """Fit the constant of eq. 4.11 to all cases in which friction does not fall with the velocity.
+    """Fit the constant c of eq. 4.11 to all cases in which friction does not fall with the velocity.
 
     Also test eq. 4.9 in region I, and eq. 4.10 on the plateau of friction.
     """
@@ -166,7 +166,7 @@ def _jump_law(data: xr.Dataset) -> Variables:
 
 
 def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
-    """Fit the constant of eq. 4.11 to stacks of mu_1 / s and of d_mu_0 v_1 / (dv s)."""
+    """Fit the constant c of eq. 4.11 to stacks of mu_1 / s and of d_mu_0 v_1 / (dv s)."""
     measured = measure("constant_stated", LAW, "constant c by the thesis")
     measured |= measure("cases", jump.shape[1], "number of cases in regions I to III")
     if jump.shape[1] < 2:
@@ -174,7 +174,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # `fitted` may repeat the fit for shifted data with another number of rows; they all use mu_1 of the first row
+        # `fitted` may repeat the fit for another number of rows of shifted data; these rows use mu_1 of the first row
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -192,7 +192,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 def _limit(
     name: str, verdict_name: str, stated: float, stack: FloatArray, count: int, meaning: str, question: str
 ) -> Variables:
-    """Return the mean of a number over some cases, and a sentence on whether the number equals the `stated` value."""
+    """Return the mean of a quantity over the cases of its `stack`, and whether it equals the `stated` value."""
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
         return nothing | measure(verdict_name, "not tested: no case in this region", question)
@@ -209,7 +209,7 @@ TRENDS = {
 
 
 def _jump_linearity(data: xr.Dataset) -> Variables:
-    """Fit straight lines to zeta and xi against dv / v_1. By eq. 4.8, zeta and xi do not depend on dv / v_1."""
+    """Fit straight lines to zeta and xi (see `NUMBERS`) against dv / v_1. By eq. 4.8, the lines are horizontal."""
     if np.unique(data["velocity_change"]).size < 3:
         sizes = np.unique(data["velocity_change"]).size
         raise FitError(f"expected jumps dv / v_1 of three sizes or more, got {sizes}")
@@ -229,10 +229,10 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
         count,
     )
     line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    # changes of the means of zeta and xi if the data are shifted by their departures from these means
+    # by how much the means of zeta and xi change when the data are shifted by their deviations from these means
     moved = scale * (flat.constants[len(both) :] - flat.constants[0])
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
-    with np.errstate(divide="ignore", invalid="ignore"):  # zeta of a resample may be zero
+    with np.errstate(divide="ignore", invalid="ignore"):  # the zeta of a resampled row may be zero
         trend = line[:, :, 1] / line[:, :1, 0]
     found: Variables = {}
     for (name, meaning), stack in zip(
@@ -242,7 +242,7 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
     sentence = flat.holds(lambda k: f"dv / v_1 = {change[k % change.size]:.2g}, relative to zeta")
     return (
         found
-        | measure("rms_error", flat.rms, "rms departure of zeta and xi from their means, divided by the mean zeta")
+        | measure("rms_error", flat.rms, "rms deviation of zeta and xi from their means, divided by the mean zeta")
         | holds(sentence)
     )
 

@@ -40,11 +40,11 @@ def master_curve(
 ) -> xr.Dataset:
     """Shift the curves of a table, or of a series of a store (means over realisations), onto one curve.
 
-    For the arguments see ``mdr-dask master-curve --help``. ``shift_factor`` and ``vertical_factor`` are the decades
-    added to log10 of abscissa and ordinate, with ``_error`` (half width of the 68 % interval), ``_low`` and ``_high``
-    (ends of the 95 % interval). If the curves differ in two parameters, log x becomes log x + a(v) + b(T), and
-    ``second_factor`` is b. If the reference lies between two groups, the factor at the reference is that of the best
-    law plus the interpolated difference between the shift factors and this law.
+    For the arguments see ``mdr-dask master-curve --help``. ``shift_factor`` is added to log10 of the abscissa,
+    ``vertical_factor`` to log10 of the ordinate. The suffix ``_error`` marks the half width of the 68 % interval,
+    ``_low`` and ``_high`` the ends of the 95 % interval. If the curves differ in two parameters, such as v and T, they
+    are shifted by a(v) + b(T), and ``second_factor`` is b. If the reference lies between two groups, its factor is that
+    of the best law plus the interpolated difference between the shift factors and this law.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -138,7 +138,7 @@ def _of_two_groups(
 def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the nearest group if the reference lies just outside the groups.
 
-    Because measured set points scatter, the reference may lie outside by a tenth of the mean distance between groups.
+    Because measured values scatter, the reference may lie outside by up to a tenth of the mean step between groups.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
@@ -156,7 +156,7 @@ def _with_laws(
     units: Mapping[str, str],
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return a master curve at a reference, with the laws of its factors and a verdict."""
+    """Return the master curve at the reference `zero`, with the laws of its shift factors and a verdict."""
     unit = units.get(by, "")
     warm = is_temperature(by, unit)
     laws, verdicts = laws_of(found, over, unit, zero, is_temperature=warm)
@@ -255,7 +255,7 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the mean friction of the first series with roughness, as a function of force and velocity.
 
     Only a series that varies both force and velocity is used. If another series has the same forces and velocities but
-    no roughness, the friction of this other series is subtracted.
+    no roughness, the friction of the series without roughness is subtracted.
     """
     wanted = {"normal_force", "velocity"}
     means = [

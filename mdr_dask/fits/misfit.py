@@ -20,11 +20,10 @@ FEWEST = 6
 class Residuals(NamedTuple):
     """Residuals of the best prediction.
 
-    `scaled` are measured minus predicted values, divided by the standard deviation of this difference. `relative` is
-    the rms of these differences, and `errors` the rms of their standard deviations; both are divided by the rms
-    measured value. `chi_squared` takes the correlations of the errors into account; it is NaN if the errors of
-    measurement are unknown. `freedom` is the number of points minus the number of constants that the data determine;
-    these constants are unknowns or products of unknowns.
+    A residual is a measured minus a predicted value. `scaled` contains the residuals over their standard deviations.
+    `relative` is the rms residual, and `errors` the rms standard deviation; both are divided by the rms measured value.
+    `chi_squared` takes the correlations of the errors into account; it is NaN if the measurement errors are unknown.
+    `freedom` is the number of points minus the number of unknowns and products of unknowns that the data determine.
     """
 
     scaled: FloatArray
@@ -69,7 +68,7 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
     """Return the probability that a trend of the residuals is due to chance, and the condition with the trend.
 
-    For each condition, a parabola is fitted to the residuals as a function of the rank of the value of the condition.
+    For each condition, a parabola is fitted to the residuals against the rank of the condition's value.
     The smallest probability is multiplied by the number of conditions, because every condition is another chance to
     find a trend.
     """

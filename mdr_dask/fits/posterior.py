@@ -16,26 +16,26 @@ from mdr_dask.fits.prediction import Predicted, Prediction
 
 #: Number of cells along each unknown before refinement. The keys are the numbers of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: `BEST`: smallest number of cells that are divided in a refinement; the keys are the numbers of unknowns. `MOST`:
-#: largest number of cells after a refinement.
+#: `BEST`: a refinement divides at least this number of cells; the keys are the numbers of unknowns. `MOST`: largest
+#: number of cells after a refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
 #: Cells are left out if ln(density) is below its maximum by more than this; their total probability is below 1e-5.
 REACH = 14.0
-#: Refinement ends when the variation of ln(density) within a divided cell is less than this value. The variation is
-#: averaged over all cells, weighted with the density.
+#: Refinement ends when ln(density) varies within the divided cells by less than this value, on average over all cells
+#: weighted with their density.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
-#: Number of sizes of the error of measurement that are considered if the table states no error.
+#: Number of possible sizes of an unknown measurement error.
 DEVIATIONS = 14
 #: Largest number of elements of an array in the likelihood.
 _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: a pattern of standard deviations, and factors (`sizes`) that may multiply the pattern.
+    """Standard deviations of the measurement errors: `pattern`, one value for each point, times one of the `sizes`.
 
-    Without a pattern, the standard deviation of a point is the factor times the absolute value of its prediction.
+    If `pattern` is None, the absolute predicted values replace it.
     """
 
     sizes: FloatArray
@@ -49,10 +49,10 @@ class Noise(NamedTuple):
 
 
 def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) -> Callable[[FloatArray], FloatArray]:
-    """Return a function that takes places in the unit cube and returns logarithms of the likelihood of measured values.
+    """Return a function that takes points in the unit cube and returns logarithms of the likelihood of measured values.
 
-    The places have the shape (sets, unknowns), the logarithms the shape (sets, number of sizes of all noises). All
-    items of `noises`, and all sizes within one item, have the same prior probability.
+    The points have the shape (sets, unknowns), the logarithms the shape (sets, number of sizes of all noises). All
+    items of `noises` have the same prior probability, and so have all sizes within one item.
     """
 
     def of(places: FloatArray) -> FloatArray:
@@ -70,9 +70,9 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return chi squared and the logarithm of the determinant of the covariance, both of shape (sets,).
+    """Return chi squared of the measured values and ln(determinant of their covariance), both of shape (sets,).
 
-    `noise` are the variances of the errors of measurement. The covariance is a diagonal matrix plus a few terms for
+    `noise` are the variances of the measurement errors. The covariance is a diagonal matrix plus a few terms for
     errors common to all points; Woodbury's identity avoids the inversion of a large matrix.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
@@ -90,7 +90,7 @@ class Posterior(NamedTuple):
     """A posterior density on cells of the unit cube.
 
     `places` are the centres of the cells, `weights` their probabilities, and `density` the logarithm of the density up
-    to a constant. `noise` is the probability of each size of the error of measurement in each cell.
+    to a constant. `noise` is the probability of each size of the measurement error in each cell.
     """
 
     places: FloatArray
@@ -128,7 +128,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
     """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
 
-    If these are more than `most` cells, a random selection of `most` cells is returned.
+    If there are more than `most` such cells, `most` of them are selected at random.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 #: Largest number of unknowns.
 MOST = 4
-#: `LARGEST`: largest number of values of the dense table of means. `PIECES`: largest number of pieces into which an
-#: interval between two computed values is divided.
+#: `LARGEST`: largest number of values in the dense table of means. `PIECES`: largest number of steps into which the
+#: interval between two computed values of an unknown is divided.
 LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
@@ -35,10 +35,10 @@ MODES, SHARE = 6, 0.999
 class Predicted(NamedTuple):
     """Predicted values of the output at the measured points, for several sets of unknowns.
 
-    `mean` is the mean over the realisations, shape (sets, points). `together`, shape (sets, points, modes), contains,
-    for each mode, one standard deviation of an error that is common to all points. Several modes represent the scatter
-    of the rough lines, and the last one the errors of grid and interpolation. `alone` is the variance of the errors
-    that are independent for each point.
+    `mean` is the mean over the realisations, shape (sets, points). `together`, shape (sets, points, modes), contains
+    errors common to all points: each mode is the change of all points by one standard deviation. The last mode
+    represents the errors of grid and interpolation, the other modes the scatter of the rough lines. `alone` is the
+    variance of the errors that are independent for each point.
     """
 
     mean: FloatArray
@@ -48,9 +48,9 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """The output at the measured points and its errors, interpolated over the unknowns of a study.
+    """The output at the measured points and the errors of the output, interpolated over the unknowns of a study.
 
-    `unknowns` contains the ascending values of each unknown. If `logarithmic`, the logarithm of the output is
+    `unknowns` contains the computed values of each unknown, ascending. If `logarithmic`, the logarithm of the output is
     interpolated.
     """
 
@@ -66,7 +66,7 @@ class Prediction:
         return [Scale.of(values) for values in self.unknowns.values()]
 
     def values(self, places: FloatArray) -> FloatArray:
-        """Return the unknowns at places in the unit cube. The values 0 and 1 in the cube are the ends of an axis."""
+        """Return the unknowns at points in the unit cube. The coordinates 0 and 1 are the ends of an axis."""
         found = []
         for scale, axis, place in zip(self.scales, self.unknowns.values(), places.T, strict=True):
             low, high = scale.of_values(axis[[0, -1]])
@@ -74,7 +74,7 @@ class Prediction:
         return np.stack(found, axis=1)
 
     def __call__(self, places: FloatArray) -> Predicted:
-        """Return the prediction for places in the unit cube, shape (sets, unknowns)."""
+        """Return the prediction for points in the unit cube, shape (sets, unknowns)."""
         mean = self._mean(places)
         errors = self._errors(places)
         alone, systematic, modes = errors[..., 0], errors[..., 1], errors[..., 2:]
@@ -151,7 +151,7 @@ def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
 
 
 def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
-    """Return whether every measured value is one of the values of the axis."""
+    """Return whether all `wanted` values are computed values of the axis."""
     nearest = np.min(np.abs(wanted[:, None] - axis), axis=1)
     return bool(np.all(nearest <= SAME * np.maximum(np.abs(wanted), np.abs(axis).max() * SAME)))
 
@@ -159,7 +159,7 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return, for every case, the numbers to interpolate; also return whether the means are replaced by logarithms.
+    """Return the numbers to interpolate for every case, and whether logarithms replace the means.
 
     The last axis contains, in this order: the mean; 1 where missing cases prevent interpolation, otherwise 0; the
     scatter that is independent for each case; the error of grid and interpolation; and the modes of the scatter that is
@@ -195,7 +195,7 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Mark the missing cases and their neighbours, because a cubic depends on two cases on each side of a point."""
+    """Mark the missing cases and their neighbours, because a cubic uses two cases on each side of a point."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -214,16 +214,16 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 
 
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the part of the standard error that is independent for each case, and the modes of the common scatter.
+    """Return the part of the standard error that is independent for each case, and the modes of the common part.
 
-    A factor from Student's t distribution enlarges both if there are few realisations.
+    A factor from Student's t distribution enlarges both parts if there are few realisations.
     """
     count = deviations.shape[-1]
     if count < 2:
         return np.zeros_like(mean), np.zeros((*mean.shape, 0))
     spare = np.maximum(number * (number - 1), 1)
     few = np.maximum(number, 2)
-    # quantile of Student's t divided by that of a normal distribution
+    # quantile of Student's t distribution divided by the quantile of a normal distribution
     widened = bootstrap.widening(few) * np.sqrt((few - 1) / few)
     each = np.nan_to_num(deviations) * (widened / np.sqrt(spare))[..., None]
     size = np.where(np.abs(mean) > 0, np.abs(mean), 1.0)
@@ -237,7 +237,7 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Interpolate the columns of `_fields` to a measured point, along one condition after the other."""
+    """Interpolate the result of `_fields` to a measured point, along one condition after the other."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):
@@ -256,10 +256,7 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return a prediction that interpolates linearly.
-
-    Means are interpolated in a dense table, errors between the computed values of the unknowns.
-    """
+    """Return the linear interpolation of the means in a dense table, and of the errors between computed values."""
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

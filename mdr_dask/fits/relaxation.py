@@ -37,11 +37,11 @@ FLOOR = 0.01  # assumed grid error of mu - mu_2, as a fraction of the largest mu
 GRID = 400  # number of rates that are tried, evenly spaced on a logarithmic scale
 
 TRUSTED = 0.5  # the fit of the power law uses a rate if the half width of the interval of ln(rate) is below this value
-SURE = 0.1  # the fit has weights 1 / (error of ln(rate)^2 + SURE^2), so that no single rate dominates
-INSTANT = 1e-9  # no relaxation is fitted if mu - mu_2 is smaller than this fraction of the rms slope at all times
+SURE = 0.1  # the fit of the power law has weights 1 / (error of ln(rate)^2 + SURE^2), so that no single rate dominates
+INSTANT = 1e-9  # no relaxation is fitted if mu - mu_2 is at all times smaller than this fraction of the rms slope
 
 TRACE = "friction_coefficient"
-#: Constants of the relaxation of a case, with units and meanings.
+#: Constants that describe the relaxation of a case: the unit and the meaning of each constant.
 FIELDS = {
     "rate": ("1", "rate b of one exponential exp(-b t') with t' = (t - t_0) / tau (eq. 4.5)"),
     "integral_rate": ("1", "mu - mu_2 just after t_0, divided by its integral over t': a rate without a model"),
@@ -57,9 +57,9 @@ class Relaxation(NamedTuple):
     """One exponential fitted to a trace, which is the mean of mu - mu_2 over realisations as a function of time.
 
     `rate` is the stack of the fitted rate, and `integral_rate` the stack of the rate that follows from the integral of
-    the trace. If scatter and errors do not explain the departures of the trace from the exponential, further rows of
-    `rate` widen the interval: the integral rate, and rates fitted to the trace after a shift by the departures. `holds`
-    is the verdict; departures are divided by the largest value of the trace.
+    the trace. If scatter and errors do not explain the deviations of the trace from the exponential, rows are added to
+    `rate`, which widen its interval: the integral rate, and rates fitted to the trace shifted by the deviations.
+    `holds` is the verdict on the deviations, divided by the largest value of the trace.
     """
 
     rate: FloatArray
@@ -68,14 +68,14 @@ class Relaxation(NamedTuple):
 
 
 def widths(time: FloatArray) -> FloatArray:
-    """Return the weights of the trapezoidal rule."""
+    """Return the weights of the values at these times in an integral by the trapezoidal rule."""
     step = np.diff(time)
     weights: FloatArray = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
     return weights
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace; the times of the trace do not resolve slower or faster rates."""
+    """Return the rates that are tried for a trace; the times of the trace do not resolve lower or higher rates."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
@@ -83,8 +83,8 @@ def tried_rates(time: FloatArray) -> FloatArray:
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each trace, shape (n, m), by weighted least squares; return rates and amplitudes.
 
-    `GRID` rates are tried, each with its best amplitude. A parabola through the quality of fit at the best rate and its
-    two neighbours refines the rate to a relative error of about 1e-4.
+    `GRID` rates are tried, each with its best amplitude. A parabola through the sums of squares at the best rate and
+    at its two neighbours refines the rate to a relative error of about 1e-4.
     """
     logs = np.log(tried_rates(time))
     shapes = np.exp(-np.exp(logs)[:, None] * time)
@@ -106,8 +106,8 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     """
     inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # the fit uses at least nine points in time
     t, y = time[inside], traces[:, inside]
-    # The weight of a time is proportional to the interval around this time, because close times carry the same
-    # information.
+    # A weight is proportional to the interval around its time, because friction at times close to each other carries
+    # nearly the same information.
     weights = widths(t) / (error[inside] ** 2 + (FLOOR * np.abs(y[0]).max()) ** 2)
     weights /= weights.sum()
     rate, amplitude = exponential(t, y, weights)
@@ -155,8 +155,8 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
     """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The grid error of mu in the store already includes that of mu_2. Therefore, the grid error of mu - mu_2 is the
-    difference between these two errors.
+    The stored grid error of mu already includes the grid error of mu_2. Therefore, the grid error of mu - mu_2 is the
+    difference between these two grid errors.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
@@ -192,7 +192,7 @@ def _closed_law(case: xr.Dataset, rate: float) -> Variables:
         rms_error = rms(departures[0])
         sentence = verdict(departures, int(jumps.counts[0]), 0, lambda j: f"t' = {time[j]:.2g}, relative to the jump")
     return {
-        **measure("rms_error", rms_error, "rms departure of mu from eqs. 4.13 to 4.15 over all times, over d_mu_0"),
+        **measure("rms_error", rms_error, "rms deviation of mu from eqs. 4.13 to 4.15 at all times, divided by d_mu_0"),
         **holds(sentence),
     }
 
@@ -248,9 +248,9 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return an array whose columns are the stacks of the rates of all cases.
+    """Return an array with one column for each case: the stack of the rates of the case.
 
-    A shorter stack is filled up with its first value.
+    Shorter stacks are padded at their end with their first value.
     """
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
@@ -264,7 +264,7 @@ def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
 def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
     """Fit a power law to rates on one side of v_1 tau q_max = 1; `x` is ln(v_1 tau q_max).
 
-    `rates` is a stack, `error` the standard error of its logarithms, and `stated` the exponent by eq. 4.12.
+    `rates` is a stack, `error` the standard errors of ln(rate), and `stated` the exponent by eq. 4.12.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"
@@ -289,7 +289,7 @@ def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, c
         **constant("power", power, count, "exponent of v_1 tau q_max in the law of the rate b"),
         **measure("power_stated", stated, "1 below v_1 tau q_max = 1, and 1 - H above it"),
         **measure("factor", float(factor), "b at v_1 tau q_max = 1 by the fitted power law"),
-        **measure("rms_error", error_of_fit, "rms relative departure from the law with the fitted power"),
+        **measure("rms_error", error_of_fit, "rms relative deviation from the law with the fitted power"),
         **measure("cases", x.size, "number of rates that are known well enough"),
         **holds(of_stated, of_fitted),
     }

@@ -64,14 +64,14 @@ def _contact_growth(data: xr.Dataset) -> Variables:
         **measure("exponent_stated", stated, "exponent 1 / (1 + H) by the thesis (after eq. 3.12)"),
         **constant("factor", level, count, "L_cont / L at F_N = G h L by the fitted power law", positive=True),
         **_balance(data, used),
-        **measure("rms_error", found.rms, "rms relative departure from the law with the fitted constants"),
+        **measure("rms_error", found.rms, "rms relative deviation from the law with the fitted constants"),
         **measure("loads", len(used), "number of loads in zone 1"),
         **holds(stated_power(x, logs, stated, count, where), found.holds(where)),
     }
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return two ratios: slope in contact divided by slope of the line, and mu divided by the value of eq. 3.12.
+    """Return two ratios: slope in contact divided by slope of the line, and computed mu divided by mu of eq. 3.12.
 
     The result is empty if the store lacks one of the required outputs.
     """
@@ -99,12 +99,12 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
     """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
-    `fraction` is the length in contact divided by that of the line. Only waves that are shorter than the length in
-    contact count; if there are no such waves, the result is NaN. The shortest wave is twice as long as the distance
-    between neighbouring `points` of the line.
+    `fraction` is the length in contact divided by the length of the line. Only waves that are shorter than the length
+    in contact count; if there are no such waves, the result is NaN. The line has `points` points, and the shortest wave
+    is as long as two spacings of the points.
     """
     power = 2 * (1 - hurst)
-    # wave numbers 2 pi / L_cont and q_max, both divided by 2 pi / L
+    # wave numbers of the longest and the shortest wave, 2 pi / L_cont and q_max, both divided by 2 pi / L
     longest, shortest = 1 / np.clip(fraction, 1e-300, 1.0), points / 2
     if power < 1e-9:
         share = np.log(shortest / longest) / np.log(shortest)
@@ -132,7 +132,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact divided by eq. 3.21", True),
-        **measure("rms_error", found.rms, "rms relative departure from eq. 3.21 with the fitted factor"),
+        **measure("rms_error", found.rms, "rms relative deviation from eq. 3.21 with the fitted factor"),
         **measure("cases", int(used.size), "number of cases whose contact is longer than the shortest wave"),
         **_friction_of_slope(data),
         **holds(holding),
@@ -140,7 +140,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
 
 
 def _friction_of_slope(data: xr.Dataset) -> Variables:
-    """Test whether friction in region IV, beyond its maximum, is proportional to the slope in contact."""
+    """Test whether friction in region IV (velocities beyond the maximum) is proportional to the slope in contact."""
     if not {"friction_coefficient", *KELVIN} <= set(data.variables):
         return {}
     table = table_of(data, 1.0, *loads_and_velocities(data))
@@ -171,7 +171,7 @@ class Collapse(NamedTuple):
 
     `shifts` is a stack, shape (rows, 2, curves), of the shifts along ln(velocity) and ln(friction). `residuals` is the
     stack of the distances of the points from the common curve. `constants` is the number of fitted constants. `vague`
-    marks curves with an undetermined shift, such as straight curves.
+    marks the curves whose shift the data do not determine, such as straight curves.
     """
 
     shifts: FloatArray
@@ -185,9 +185,9 @@ def collapse(
 ) -> Collapse:
     """Shift curves of ln(friction) against ln(velocity) onto a common natural cubic spline by least squares.
 
-    The problem is solved for the first row of the stack; the shifts of the other rows follow by linearisation. `curve`
-    contains, for each point, the index of its curve. One search begins with the shifts `start`, another with no shifts;
-    the better result is used. Without `vertical`, curves are shifted along ln(velocity) only.
+    The shifts are fitted to the first of the stacked `rows`; the shifts for the other rows follow by linearisation.
+    `curve` contains, for each point, the index of its curve. One search begins with the shifts `start`, another with
+    zero shifts; the better result is used. Without `vertical`, curves are shifted along ln(velocity) only.
     """
     from scipy.optimize import OptimizeResult, least_squares
 
@@ -228,7 +228,7 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the matrix, shape (places, knots), that converts heights at the knots to values of a natural cubic spline.
+    """Return the matrix, shape (places, knots), that maps heights at the knots to a natural cubic spline at `place`.
 
     Outside the range of the knots, the spline continues as a straight line.
     """

@@ -19,9 +19,9 @@ from mdr_dask.errors import FitError, distinguishable
 
 #: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
-#: Smallest number of points from which an index is computed.
+#: Smallest number of base points (in Saltelli's design) or cases from which an index is computed.
 FEWEST = 16
-#: Number of groups into which the points are divided for the jackknife.
+#: Number of groups into which the jackknife divides the base points or cases.
 GROUPS = 20
 
 
@@ -33,9 +33,9 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     outputs of neighbouring cases are multiplied (Gamboa et al., Bernoulli 28, 2345 (2022), here with several
     neighbours).
 
-    The intervals follow from a jackknife over groups of points and over realisations. They tend to be too wide, because
-    points of a Sobol sequence fill space more evenly than random points. In Saltelli's design, an index is computed
-    from the base points for which all required cases succeeded; in other designs, it is computed from all cases that
+    The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
+    wide, because points of a Sobol sequence fill space more evenly than random points. In Saltelli's design, an index
+    is computed from the base points for which all required cases succeeded; in other designs, from all cases that
     succeeded.
     """
     inputs = _inputs(dataset)
@@ -115,7 +115,7 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the mean product of `left` and `right` over all pairs of different realisations.
+    """Return for each point the product of `left` and `right`, averaged over all pairs of different realisations.
 
     A single realisation is paired with itself.
     """
@@ -129,7 +129,7 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
 def _exchanged(values: FloatArray) -> FloatArray:
     """Return the first-order and the total index of one input, from outputs of shape (realisations, points, 3).
 
-    The last dimension holds the outputs at point a, at point b, and at point a with the input of point b.
+    The last dimension contains the outputs at point a, at point b, and at point a with the input of point b.
     """
     a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
     if a.shape[1] < FEWEST:
@@ -143,10 +143,10 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
 
-    The index is the mean of two estimates, and its interval contains both. The first estimate uses products of
-    different points only; it is right for random points. The second estimate also uses the product of each point with
-    itself. It is right for points that fill space evenly, such as a Sobol sequence, because neighbours then differ
-    systematically in their other inputs.
+    The index is the mean of two estimates; its interval extends from the lower end of the first interval to the upper
+    end of the second. The first estimate uses products of different points only; it is right for random points. The
+    second estimate also uses the product of each point with itself. It is right for points that fill space evenly, such
+    as a Sobol sequence, because neighbours then differ systematically in their other inputs.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -177,7 +177,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half widths of the intervals; each of `parts` contains the indices without one part of the data."""
+    """Return the half widths of the intervals from `parts`: each item was computed without one part of the data."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error

@@ -10,8 +10,8 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most one of these fractions: the first fraction
-#: for which the parabola fits.
+#: A parabola is fitted to the points that are below the maximum by at most a fraction: the first of these fractions
+#: for which scatter and errors explain the residuals.
 TOPS = (0.3, 0.2, 0.1, 0.05)
 FLAT = 0.05  # points that are below the maximum by at most this fraction belong to the plateau
 
@@ -25,7 +25,7 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """Stacks that describe the maximum of a parabola through the points near the largest friction.
+    """Stacks that describe the maximum of a parabola that is fitted to the points near the largest friction.
 
     `height` is the maximum, corrected for its bias; its interval includes the residuals of the parabola. `place` is
     ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum; it is 0 unless the maximum is
@@ -52,15 +52,15 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    # a parabola through three points has no residuals; its error is then its maximum minus the value of the highest
-    # point
+    # a parabola through three points has no residuals; the error of its maximum is then the distance from the highest
+    # of these points
     else:
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the range of points around the maximum that are below it by at most the fraction `drop`.
+    """Return the range of points that are below the maximum by at most the fraction `drop` of the maximum.
 
     The range contains at least three points.
     """
@@ -75,7 +75,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Fit a parabola to every row. Return the maximum, its place, the slope at this place, and the residuals."""
+    """Fit a parabola to every row. Return the maximum, its position, the relative slope there, and the residuals."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])
