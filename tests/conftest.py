@@ -5,6 +5,7 @@ import importlib
 import os
 import pkgutil
 import shutil
+import signal
 from pathlib import Path
 
 import hypothesis
@@ -107,3 +108,11 @@ def filled(campaign, finished) -> str:
     """A copy of the store of the small campaign."""
     shutil.copytree(finished, "results/small.zarr")
     return "results/small.zarr"
+
+
+@pytest.fixture
+def heeds_interrupts():
+    """This process and those that a test starts react to Ctrl-C, even in the background of a shell or of pytest."""
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, handler)

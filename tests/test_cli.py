@@ -143,7 +143,9 @@ def started(*arguments: str) -> subprocess.Popen[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("options", "sent"), [("--threads", signal.SIGINT), ("--workers", signal.SIGTERM)])
-def test_an_interrupted_process_group_ends_with_one_message_and_no_process_left(campaign, options, sent):
+def test_an_interrupted_process_group_ends_with_one_message_and_no_process_left(
+    heeds_interrupts, campaign, options, sent
+):
     psutil = pytest.importorskip("psutil")
     campaign.write_text(LIVE)
     process = started("run", str(campaign), "--quiet", options, "1")

@@ -3,7 +3,6 @@
 import importlib
 import json
 import re
-import signal
 import sys
 from dataclasses import replace
 from importlib.metadata import EntryPoint
@@ -237,13 +236,9 @@ def test_a_fault_in_another_function_of_the_model_is_one_message(example, capsys
     assert re.search(sentence, capsys.readouterr().err)
 
 
-def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case():
-    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # workers of pytest ignore it
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))
-    finally:
-        signal.signal(signal.SIGINT, handler)
+def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case(heeds_interrupts):
+    with pytest.raises(KeyboardInterrupt):
+        per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))
 
 
 def test_an_output_may_declare_that_nan_is_normal(example, capsys):
