@@ -11,7 +11,7 @@ from functools import lru_cache
 from mdr_dask.errors import similar
 from mdr_dask.units import conversion, is_unit
 
-#: Each line contains names of one quantity. The case of letters matters only in names of one letter.
+#: Each line contains names of one quantity. The case of letters matters only in one-letter names.
 SYNONYMS = tuple(
     tuple(line.split(", "))
     for line in """\
@@ -42,7 +42,7 @@ radius, r
 wear volume, worn volume, verschleißvolumen
 """.splitlines()
 )  # fmt: skip
-#: Words in front of or behind the name of a quantity that do not change its meaning.
+#: Words before or after the name of a quantity that do not change the meaning of the name.
 IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured", "linear"}
 #: Units that may be joined to a name, as in ``freq_hz``. Each key is the unit as it appears in the name, in lower case.
 JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}
@@ -58,8 +58,8 @@ class Column:
     """The description of a column that a table may have. The table may also use one of the `SYNONYMS` of its name.
 
     The SI `unit` is ``"1"`` for pure numbers. Values must be greater than `above` and not smaller than `least`, in SI.
-    `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of every
-    column that does not contain pure numbers.
+    `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of this
+    column, unless the column contains pure numbers.
     """
 
     name: str
@@ -138,7 +138,7 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column that a name means, and its unit, which may be part of the name: mm/s in ``v_mm_s``.
+    """Return the column that a name means, and the unit, which may be part of the name: mm/s in ``v_mm_s``.
 
     The column is None if the name means none of the `columns`.
     """

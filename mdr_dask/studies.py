@@ -65,7 +65,7 @@ def check(source: Source) -> Summary:
     Returns
     -------
     Summary
-        Counts of cases and results, bytes and seconds. ``print`` shows the lines of ``mdr-dask check``.
+        Number of cases and results, size and computing time. ``print`` shows the lines of ``mdr-dask check``.
 
     Raises
     ------

@@ -132,7 +132,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield lines with the counts, the size and the time of a study, each for the first round and for all rounds."""
+    """Yield lines with the number of results, the size and the time of a study in the first round and in all rounds."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
@@ -160,7 +160,7 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return counts, bytes and seconds of a study by key. Users read these keys from JSON: keep them."""
+    """Return the costs of a study by name. Users read these names from JSON, so do not change them."""
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,
@@ -193,6 +193,6 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _counted(what: str, first: int, more: float) -> str:
-    """Return a text with the count of the first round and, if there may be further rounds, of all rounds."""
+    """Return a number with a noun, such as ``2 cases``, or ``2 to 8 cases`` if there may be further rounds."""
     last = round(first * more)
     return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"

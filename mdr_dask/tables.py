@@ -34,7 +34,7 @@ SHEET = "# sheet of a workbook: "
 AGREE = 0.01
 NO_ROWS = "expected a line of names and at least one line of values"
 
-#: A name of common logarithms: ``log10 q``, ``lg(q)``.
+#: A column name that stands for a common logarithm: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
 #: Characters that may separate thousands, in addition to the point or comma that is not the decimal mark.
 _GROUPS = "'\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"
@@ -100,7 +100,7 @@ class TableError(DataError):
 class Sheet:
     """A table as text.
 
-    `cells` has the shape (rows, columns), and its numbers have decimal points. `lines` contains the line from which
+    `cells` has the shape (rows, columns); all numbers in it have decimal points. `lines` contains the line from which
     each row was read. `names` and `units` are as written, and empty if the table lacks them. `head` is the line of
     names, or the first row of numbers if there are no names. `notes` are the first cells of the lines of text below the
     numbers.
@@ -201,7 +201,6 @@ def _lines(text: str) -> list[Line]:
 
 
 def _split(line: str, separator: str) -> list[str]:
-    """Return the cells of a line."""
     if separator == BLANKS:
         return re.sub(r"\s+(?=[\[(])", "", line).split()  # a unit in brackets belongs to the name before it
     if '"' not in line:
@@ -267,7 +266,7 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """The cells of a text as an array, and masks of the cells that are filled, numbers or words.
+    """The cells of a text as an array, with three masks: of filled cells, of numbers, and of words.
 
     `length` is the number of cells of each line, before short lines are filled up with empty cells. A `word` is neither
     a number nor a mark of a missing number.
@@ -335,8 +334,8 @@ def _head(grid: _Grid) -> _Head:
     """Find the names and units in the lines of text above the numbers.
 
     Only lines with as many cells as most lines of numbers are considered; if there is no such line, the last line above
-    the numbers contains the names. If a line of units stands below one of the considered lines, the names are in the
-    line above the units. Otherwise the names are in the last line, and the units may be in the line above it.
+    the numbers contains the names. If a considered line other than the first contains units, the names are in the
+    considered line above it. Otherwise the last considered line contains the names, and the one above it may be units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -360,8 +359,8 @@ def _head(grid: _Grid) -> _Head:
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     """Return masks of the lines and of the columns that contain numbers.
 
-    A column is numeric if it contains numbers in at least half of the lines of the most frequent length. A line
-    contains numbers if at least half of its filled cells in these columns are numbers or marks of missing numbers. A
+    Among lines with the most frequent number of cells, at least half must have a number in a numeric column. A line
+    contains numbers if at least half of its filled cells in numeric columns are numbers or marks of missing numbers. A
     line that begins with a word is text if the word is in a numeric column, or if less than half of the columns are
     filled. If such a line is shorter than most lines, it is text even if exactly half of the columns are filled.
     """
@@ -441,7 +440,7 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
     """Raise TableError if a line lacks a number, or has more cells than there are names."""
     first = grid.lines[rows[0] if head.names is None else head.names]
-    blanks = width > head.numeric.size and first.separator == BLANKS  # a blank inside a name separates two cells
+    blanks = width > head.numeric.size and first.separator == BLANKS  # a name that contains a blank became two cells
     wrong = [
         row
         for row in rows
@@ -457,7 +456,7 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
 
 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
-    """Return the cells of lines with decimal points and without marks between thousands.
+    """Return the cells of `rows`, and rewrite their numbers with decimal points and without marks between thousands.
 
     If some numbers have a decimal point and others a decimal comma, TableError is raised.
     """
@@ -635,7 +634,7 @@ def _unit(written: str, column: Column) -> str:
 def _values(
     sheet: Sheet, place: int, column: Column, unit: str, is_logarithm: bool, allow_missing: bool
 ) -> tuple[FloatArray, list[Problem]]:
-    """Return the values of a column in SI, and a list of its first problem (empty if there is no problem)."""
+    """Return the values of a column in SI, and a list with the first problem (empty if there is none)."""
     values, wrong = np.full(len(sheet.cells), np.nan), []
     before, factor, zero = factors(unit, column.unit)
 

@@ -16,9 +16,9 @@ from mdr_dask.errors import distinguishable, similar
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: Units in the syntax of pint. Pint's own list of 900 units takes ten times as long to load. It also contains units
-#: with names of one letter (``c``, ``e``, ``M``), which in a campaign are more likely to be mistakes. In this list,
-#: unlike in pint's own list, angles have a dimension.
+#: Units in the syntax of pint. Pint's own list of 900 units takes ten times as long to load. Pint's list
+#: also contains units with one-letter names (``c``, ``e``, ``M``), which in a campaign are more likely to be mistakes.
+#: In the list below, unlike in pint's own list, angles have a dimension.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -113,8 +113,8 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Texts with more characters, and exponents of more than two digits, are refused.
-#: Pint may need an extremely long time to parse them.
+#: Texts with more characters than `_MOST_LETTERS`, and exponents of more than two digits, are refused, because pint may
+#: need an extremely long time to parse them.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
@@ -241,7 +241,7 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
     A number with a dimension is doubtful if it differs from the first of the `usual` values by more than 3 decades. Any
-    number is doubtful if it would be nearer to the first usual value in the unit of one of the usual values.
+    number is also doubtful if the unit of one of the `usual` values brings it nearer to the first of these values.
     """
     if value == 0:
         return False

@@ -1,4 +1,4 @@
-"""The data classes of a campaign. Their values are checked and in SI units."""
+"""The data classes of a campaign. All values have been checked, and quantities are in SI units."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Spread:
         return [tidy(value, self.whole) for value in values]
 
     def shares(self, values: Any) -> FloatArray:
-        """Return the fraction of the interval at which each value lies. This is the inverse of `at`."""
+        """Return the position of each value as a fraction of the interval. This is the inverse of `at`."""
         numbers = np.asarray(values, dtype=np.float64)
         if self.geometric:
             found: FloatArray = np.log(numbers / self.low) / np.log(self.high / self.low)
@@ -68,9 +68,9 @@ class Axis:
 
     # Dotted path in the model's parameters (``velocity``, ``indenter.angle``).
     path: str
-    # Name of its coordinate in the store: the path with ``_`` for ``.``.
+    # Name of the axis's coordinate in the store: the path with ``_`` for ``.``.
     name: str
-    # Its dimension in the store. In a grid this is `name`; if parameters vary together, it is ``case``.
+    # Dimension of the axis in the store. In a grid this is `name`; if parameters vary together, it is ``case``.
     dim: str
     # Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     values: tuple[Any, ...]

@@ -99,7 +99,7 @@ def _choices(info: FieldInfo) -> list[str]:
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
     """Return examples of the value of a field, each as text.
 
-    If the field accepts parameter sets, there is one example for each set, and one for each alternative of a set.
+    If the field accepts parameter sets, each set has one example, or one for each of its alternatives.
     """
     info = parameters.model_fields[name]
     kinds = list(fields.structures(info))
@@ -112,7 +112,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return examples of a parameter set, each on one line; if it has alternatives, one for each in the first group."""
+    """Return one example of a parameter set, or an example for each alternative in its first group of alternatives."""
     group = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]

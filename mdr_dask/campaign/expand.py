@@ -268,7 +268,7 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return the data, with the checked values of `base` for all parameters that are not in `varied`."""
+    """Return `data`, in which each parameter outside `varied` has its checked value from `base`."""
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

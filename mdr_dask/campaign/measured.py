@@ -29,7 +29,7 @@ _ERROR = re.compile(
 LARGEST = 10**6
 #: Conditions are equal if their relative difference is at most this.
 SAME = 1e-6
-#: Largest number of rows outside a study that a message names.
+#: A message names at most this number of rows outside the ranges of a study.
 FEW = 3
 
 
@@ -37,8 +37,8 @@ FEW = 3
 class Measured:
     """Measured points in SI; each array has the shape (points,).
 
-    `errors` are standard errors of the values, and `error_column` the name of their column. The keys of `conditions`
-    are names of coordinates of the store. `remark` names unused columns and counts rows that lack a number.
+    `errors` are standard errors of `values`, read from the column `error_column`. The keys of `conditions` are names of
+    coordinates of the store. `remark` names unused columns and counts rows that lack a number.
     """
 
     source: str
@@ -61,8 +61,8 @@ def read_measured(
     """Read a table of measured points. `conditions` and `outputs` map names of possible columns to their SI units.
 
     A heading may be short for a name: ``temperature`` means ``solid_temperature``, if every other name that ends in
-    ``temperature`` has more words. An axis without a column is an unknown. DataError is raised if the numbers of an
-    unused column lie within the range of such an axis, because the column may be meant for this axis.
+    ``temperature`` has more words. An axis without a column is an unknown parameter. DataError is raised if the numbers
+    of an unused column lie within the range of such an axis, because the column may be meant for this axis.
     """
     sheet = read_sheet(text, source)
     short = _short_names([*conditions, *outputs])
@@ -101,8 +101,8 @@ def read_measured(
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
     """Return the headings of the columns with errors of the output, their unit, and whether the errors are relative.
 
-    The output is the last of `columns`. The unit is empty if one of the headings states a unit. Otherwise the errors
-    have the unit of the output. Errors in percent are relative, unless the values are in percent as well. A heading
+    The last of `columns` is the output. The unit is empty if one of the headings states a unit. Otherwise the errors
+    have the unit of the output. Errors in percent are relative, unless the output is in percent as well. A heading
     without a quantity, such as ``std``, belongs to the nearest known column before it.
     """
     output, headings, given, before = columns[-1], [], "", None
@@ -128,8 +128,8 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return the short forms of each name, such as ``temperature`` for ``solid_temperature``.
 
-    A short form consists of the last words of a name. If several names end in these words, it belongs to the name with
-    the fewest words, or to none if two names have equally few.
+    A short form consists of the last words of a name. If several names end in these words, the short form belongs to
+    the name with the fewest words, or to no name if two names have equally few words.
     """
     words = [tuple(name.split("_")) for name in names]
     found: dict[str, tuple[str, ...]] = {"_".join(each): () for each in words}
@@ -179,7 +179,7 @@ def _readings(
 
 
 def notes(campaign: Campaign) -> Iterator[str]:
-    """Yield notes on the measured points for each series: output, conditions, unknowns, and rows outside the study."""
+    """Yield notes on the measured points of each series, such as the unknowns, and rows outside the study's ranges."""
     for series, found in _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series):
         assert campaign.measured is not None
         before = f"measured {campaign.measured.name}{f', series {series.name}' if series.name else ''}"

@@ -22,7 +22,7 @@ from mdr_dask.units import to_si
 
 
 def load(path: str | FilePath) -> Campaign:
-    """Read a campaign file. Names of files in it are relative to its folder.
+    """Read a campaign file. File names in the campaign are relative to the folder of this file.
 
     A CampaignError lists all problems by line: ``force.yaml:12:12: parameters.hurst: expected at most 1, got 1.2``.
     """

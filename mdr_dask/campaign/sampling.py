@@ -48,10 +48,10 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the points of the design of Saltelli from pairs of points a in `first` and b in `second`.
+    """Return the points of a Saltelli design from pairs of points: a in `first` and b in `second`.
 
-    Each pair gives a, b, and one point for every input: a copy of a in which this input has its value from b. All
-    arrays have the shape (points, inputs).
+    Each pair gives a, b, and one point for every input: a copy of a in which this input has the value that it has in b.
+    All arrays have the shape (points, inputs).
     """
     import numpy as np
 

@@ -40,7 +40,7 @@ def json_schema() -> Schema:
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
     """Return the schema of the key ``parameters`` for a model. Each parameter is a value, a list or a range.
 
-    `references` is the pattern of JSON references to nested parameter sets, in which ``{model}`` stands for the set.
+    `references` is the form of a reference to a nested parameter set; ``{model}`` stands for the name of the set.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

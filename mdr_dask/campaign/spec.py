@@ -126,7 +126,7 @@ Realisations = Annotated[
 
 
 class StoreSpec(Parameters):
-    """The store of the results: its place and its chunks."""
+    """The store of the results: its path and its chunks."""
 
     path: str | None = Field(
         None,

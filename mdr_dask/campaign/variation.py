@@ -37,7 +37,7 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written in the file or in SI.
+    """One value of a varied parameter: as written in the file, or in SI if it was computed from a range.
 
     `inner` is true for a value that was computed from a range and is neither the smallest nor the largest.
     """
@@ -84,9 +84,9 @@ def find(
 ) -> tuple[Variation, ...]:
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
-    `paths` contains the path in the document of each parameter in `data`. If `drawn` is true, values are drawn from the
-    ranges, and a range does not state a number of values. A parameter whose list or range is wrong is returned without
-    values.
+    For each parameter in `data`, `paths` contains its path in the document. If `drawn` is true, values are drawn from
+    the ranges, and a range does not state a number of values. A parameter whose list or range is wrong is returned
+    without values.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))

@@ -42,7 +42,7 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter with a number that has no unit and is perhaps not meant in SI.
 
-    `paths` contains the path in the document of each parameter in `data`. `units` maps the dotted name of a parameter
+    For each parameter in `data`, `paths` contains its path in the document. `units` maps the dotted name of a parameter
     to its unit if this is not the unit that the model declares.
     """
     asked: set[Path] = set()

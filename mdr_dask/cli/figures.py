@@ -223,7 +223,7 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
         raise click.UsageError("expected --over once, --over twice (for a map), or --effects")
     log = axes["log"]
     if log is not None and log != "none" and not set(log) <= set("xyz"):
-        raise click.UsageError(f"expected --log with letters of xyz, or 'none', got {log!r}")
+        raise click.UsageError(f"expected --log with one or more of the letters x, y and z, or 'none', got {log!r}")
     by, panels = (axes[key].replace(".", "_") for key in ("by", "panels"))
     return figure_of(groups, name, over if over or axes["effects"] else None, by, panels, "" if log == "none" else log)
 

@@ -1,4 +1,4 @@
-"""The command `master-curve`: merge the curves of a store or a table, or change the reference of a kept result."""
+"""The command `master-curve`: merge the curves of a store or a table, or change the reference of a kept curve."""
 
 from __future__ import annotations
 

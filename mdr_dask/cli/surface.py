@@ -132,7 +132,7 @@ def _kind(file: str, options: dict[str, Any]) -> str:
     """Return the kind of a file: a spectrum, a map or a scan.
 
     The names of the columns show whether a file is a spectrum. A file is a map if it has two dimensions, or if an
-    option is given that only maps have.
+    option is given that applies only to maps.
     """
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions

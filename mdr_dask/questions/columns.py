@@ -124,9 +124,7 @@ class Columns:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the names of the outputs that are needed to compute columns, including those in formulas of dimensionless
-    numbers.
-    """
+    """Return the names of outputs that columns need; a dimensionless number needs the outputs in its formula."""
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:

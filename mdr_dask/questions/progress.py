@@ -98,8 +98,7 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return the unit that replaces each SI unit in messages. It is the unit in the campaign file, if the file uses
-    only one.
+    """For each SI unit in messages, return the unit that the campaign file uses instead, if it uses only one.
 
     Temperatures in K are converted to degC, unless the file uses another unit for temperatures.
     """

@@ -1,4 +1,4 @@
-"""Answer a question with the rows of a table. The study is read box by box: the first rows are available quickly."""
+"""Answer a question with the rows of a table. The study is read in parts (boxes), so the first rows appear quickly."""
 
 from __future__ import annotations
 
