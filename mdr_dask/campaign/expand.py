@@ -268,7 +268,7 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return `data`, in which each parameter outside `varied` has its checked value from `base`."""
+    """Return `data`, with the checked values from `base` for all parameters that are not in `varied`."""
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

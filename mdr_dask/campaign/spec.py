@@ -79,7 +79,7 @@ class LatinHypercubeSpec(Parameters):
 
 
 class SaltelliSpec(Parameters):
-    """Cases drawn as the design of Saltelli for Sobol indices."""
+    """Cases of Saltelli's design for Sobol indices."""
 
     saltelli: Whole = Field(
         ge=2,

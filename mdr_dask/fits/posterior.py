@@ -52,7 +52,7 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
     """Return a function that takes points in the unit cube and returns logarithms of the likelihood of measured values.
 
     The points have the shape (sets, unknowns), the logarithms the shape (sets, number of sizes of all noises). All
-    items of `noises` have the same prior probability, and so have all sizes within one item.
+    items of `noises` have the same prior probability. All sizes of one item have the same prior probability, too.
     """
 
     def of(places: FloatArray) -> FloatArray:

@@ -127,7 +127,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     return Relaxation(rate, integral, holds)
 
 
-# the relaxation of one case, compared with its laws
+# comparison of the relaxation of one case with the laws of the thesis
 
 
 def law_rate(number: float, hurst: float) -> float:

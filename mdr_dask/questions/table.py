@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: `ROWS`: number of rows that are computed at a time. `WHOLE`: a study of at most this size in bytes is read at once.
+#: `ROWS`: largest number of rows in one step of the computation. `WHOLE`: largest size in bytes of a study that is
+#: read in one step.
 ROWS, WHOLE = 2**16, 2**26
 
 

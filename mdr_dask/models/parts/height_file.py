@@ -135,9 +135,9 @@ def dimensions(file: DataFile) -> int:
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
     """Return the unit of the heights in m, such as 1e-6, and the spacings along x and y in m.
 
-    The file or the user states the unit and the spacings. If only the unit of the positions is missing, it is found
-    from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. A
-    unit that is found in this way is a power of ten of a metre.
+    Unit and spacings are taken from the file or from the options of the user. If only the unit of the positions is
+    missing, it is found from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the
+    unit is 1e-6 m. A unit that is found in this way is a power of ten of a metre.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)

@@ -20,8 +20,8 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# The finest grid that is usually needed has this many times the points of the line: the first number is for plane
-# Kelvin bodies, the second for all other bodies.
+# Number of nodes of the finest grid that is usually needed, divided by the number of points of the line: for plane
+# Kelvin bodies, and for all other bodies.
 USUAL_ON_PLANES, USUAL = 2, 16
 BYTES_A_NODE = 150  # peak memory in bytes per grid point, for a line and one case; 20 to 130 bytes were measured
 OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line

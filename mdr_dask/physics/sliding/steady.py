@@ -154,8 +154,8 @@ def _states(
     """Solve cases on one line at one Deborah number, in ascending order of the load.
 
     `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the guess for the case, or,
-    if the guess is NaN, from the trail of the previous case. The first case starts from the trail `first`, which is
-    replaced by the trail of the first case that was solved.
+    if the guess is NaN, from the trail of the previous case. The first case starts from the trail in `first`;
+    afterwards `first` contains the trail of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))

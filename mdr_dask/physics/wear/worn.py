@@ -185,7 +185,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        # a change of the image within this distance of the border is part of the jump
+        # the image jumps at the border: points this close to the border are left out
         changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
