@@ -1,4 +1,4 @@
-"""The exceptions of mdr_dask, and parts of their messages. Workers send exceptions to the driver in pickled form."""
+"""The exceptions of mdr_dask, and parts of their messages. Workers pickle exceptions: use positional arguments only."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def distinguishable(
     digits: int = 3,
     write: Callable[[float, int], str] = lambda number, digits: f"{number:.{digits}g}",
 ) -> tuple[str, ...]:
-    """Return a number and its limits as texts, with more digits than `digits` if different numbers would look equal."""
+    """Return a number and its limits as texts of `digits` digits, or more if the number would look equal to a limit."""
     for more in range(digits, _ALL_DIGITS):
         first, *others = (write(number, more) for number in (value, *limits))
         if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):

@@ -1,4 +1,4 @@
-"""Turn a campaign into templates, which describe the arrays of the store, and blocks, which are computed."""
+"""Turn a campaign into templates of the arrays in the store, and into blocks to compute."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class Template:
     def _operations(self, block: Block[Any]) -> float:
         """Return the number of operations of a block.
 
-        If the model does not count operations, return a number with which a study of N results gets about sqrt(N)
+        If the model does not count operations, assume a number with which a study of N results gets about sqrt(N)
         blocks.
         """
         count = models.load(self.campaign.model).operations

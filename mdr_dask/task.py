@@ -226,7 +226,7 @@ def _compute_part(
     values: dict[str, NDArray[np.float64]],
     status: NDArray[np.int8],
 ) -> Result:
-    """Compute the wanted results of a block, and write them into `values` and `status` beside the other results."""
+    """Compute the wanted results of a block, and insert them into the arrays `values` and `status` of the block."""
     flat_status = status.reshape(wanted.shape)
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:

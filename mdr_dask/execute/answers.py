@@ -27,9 +27,9 @@ def cases_that_narrow(
 ) -> list[BoolArray]:
     """Return the cases that need more realisations, because they affect a constant whose interval is too wide.
 
-    As long as every case has fewer than `FEWEST` realisations, all new cases of the stage need more. `places` are the
-    positions that the cases of the stage have in the store. `taken` contains, for each case, the number of realisations
-    from which the constants are computed.
+    As long as every case has fewer than `FEWEST` realisations, all cases that are new in this stage need more. `places`
+    are the positions that the cases of the stage have in the store. `taken` contains, for each case, the number of
+    realisations from which the constants are computed.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:

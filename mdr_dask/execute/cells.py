@@ -49,11 +49,11 @@ def find_cells(
     retry_failed: bool,
     own: NDArray[np.bool_] | None = None,
 ) -> Cells:
-    """Compare a round with the ledger to find the results that are missing.
+    """Compare a round with the ledger to find the results that the round still has to compute.
 
     `asked` marks the cases of the stage, and `needed` the cases that need the realisations of the round. `realisations`
-    are the number of the first realisation of the round, and the number of its last realisation plus 1. `own` marks the
-    results that this part of the campaign computes; if it is None, all results are computed.
+    are the index of the first realisation of the round, and the index of the last one plus 1. `own` marks the results
+    that this part of the campaign computes; if it is None, all results are computed.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -72,7 +72,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield an array for each group: the number, from 1 to `count`, of the part that computes each result."""
+    """For each group, yield an array with the number of the part (1 to `count`) that computes each result."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)

@@ -24,12 +24,12 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Time in s to wait for the first answer of a scheduler, which also has to import its modules.
+#: Time in s to wait for the first answer of a scheduler, which must import its modules before it can answer.
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
-#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time. One block
-#: takes about the same time.
+#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time. The
+#: computation of one block takes about as long.
 TARGET_DURATION = "1s"
 #: Loggers whose messages explain why workers cannot be started. Messages of the run quote the last of these messages.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
@@ -65,7 +65,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        # needed if the user gives a client whose workers are threads of this process
+        # the workers of a client that the user gives may be threads of this process
         stack.enter_context(one_blas_thread())
         most: int = 0
         replace_lost: Callable[[], None] | None = None
@@ -90,7 +90,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
 
 
 def _require_guard() -> None:
-    """Raise ClusterError if a script lacks ``if __name__ == "__main__"``: worker processes import the script."""
+    """Raise ClusterError if a script lacks ``if __name__ == "__main__"``, because worker processes import it."""
     main = sys.modules.get("__main__")
     source = getattr(main, "__file__", None)
     frame = sys._getframe()
@@ -104,7 +104,7 @@ def _require_guard() -> None:
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them, because Dask adds handlers to loggers at both levels."""
+    """Return the named loggers and all loggers below them, because Dask adds handlers to both."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 

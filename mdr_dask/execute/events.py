@@ -77,7 +77,7 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimated time in s to the end of this round, from the pace of finished blocks; None if no block is finished.
+        """Estimated time in s to the end of this round, from the pace of this run; None if no block is finished.
 
         The pace does not include the time for compiling kernels.
         """

@@ -57,7 +57,7 @@ class _Round:
     # round.
     asked: list[BoolArray]
     needed: list[BoolArray]
-    # Number of the first realisation of the round, and number of the last one plus 1.
+    # Index of the first realisation of the round, and index of the last one plus 1.
     realisations: tuple[int, int]
     # For each group, an array with the shape of its cases: the number of realisations of each case after the round.
     taken: tuple[IntArray, ...]
@@ -72,7 +72,7 @@ def run(
     part: Part | None = None,
     tell: Tell = lambda _: None,
 ) -> Progress:
-    """Compute the results of a campaign that are missing in its store, and return the state at the end of the run.
+    """Compute the results of a campaign that are missing in its store, and return the final progress.
 
     `report` receives the progress after every block, and `tell` every event, from any thread. With a `part`, only the
     blocks of this part are computed and counted, while other parts may run at the same time.

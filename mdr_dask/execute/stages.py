@@ -36,7 +36,7 @@ def _all_of(template: Template) -> Mapping[str, IntArray]:
 
 
 def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Sequence[BoolArray]) -> list[BoolArray]:
-    """Convert masks of the cases of a stage to masks of the cases in the store, in the order of its dimensions."""
+    """Convert masks of the cases of a stage to masks of the cases in the store, with the dimensions of the store."""
     found = []
     for mesh, template, place, wanted in zip(stage.meshes, layout, places, cases, strict=True):
         dims = template.dims[:-1]
@@ -50,7 +50,7 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, and an event that reports the numbers of values.
+    """Return the stage that follows a finished stage, and an event with the number of values on each adaptive axis.
 
     The stage is None if no further values are needed. Only the first `realisations` realisations of each case are used.
     """

@@ -25,7 +25,7 @@ from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
 CHECK_PAUSE = 1.0
 #: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
-#: Time in s to wait for an answer of the scheduler or for a result that a worker has finished.
+#: Time in s to wait for an answer from the scheduler, or for a finished result from a worker.
 ANSWER_LIMIT = 3.0
 #: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"
@@ -43,8 +43,8 @@ class TaskWindow:
 
     The run ends with an error after `patience` seconds without any worker, and a case fails after `case_timeout`
     seconds. `most` is the largest number of threads of an adaptive cluster, and 0 for other clusters. `replace_lost`
-    requests new workers; it is None if the run need not do this. `last_message` returns the last error message of the
-    cluster.
+    requests workers in place of lost ones; it is None if the run need not replace workers. `last_message` returns the
+    last error message of the cluster.
     """
 
     def __init__(

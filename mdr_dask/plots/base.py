@@ -78,15 +78,13 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """For the head of the table of a figure that a command drew, return the program version, the command and the
-    campaigns.
-    """
+    """Return the program version, the command and the campaigns of a figure that a command drew, for its table."""
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 
 
 def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """For the head of the table of a figure drawn from Python, return the program version and the campaigns."""
+    """Return the program version and the campaigns of a figure that was drawn from Python, for its table."""
     campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
     return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 

@@ -87,8 +87,8 @@ def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Po
 
 
 def _along(found: fit.Calibration, x: Axis, points: Points, data: xr.Dataset) -> FloatArray:
-    """Return the positions of measured points on the horizontal axis; if the axis shows no condition, the numbers of
-    the points.
+    """Return the positions of measured points on the horizontal axis. If this axis shows no condition, the points are
+    numbered from 1.
     """
     if not x.quantity:
         return np.asarray(points, dtype=np.float64) + 1

@@ -13,7 +13,7 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
 
-#: Columns of the table of a figure to the left and to the right of the parameters.
+#: In the table of a figure: the columns to the left of the parameters, and those to the right of the parameters.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
 #: Entry of the column ``what`` for results of a study.
@@ -22,7 +22,7 @@ Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values, and the two ends of their 95 % intervals. The ends are NaN if the error is unknown."""
+    """Values, and the two ends of their intervals. The ends are NaN if the error is unknown."""
 
     value: Any
     low: Any
@@ -71,12 +71,12 @@ class Key:
 class Trace:
     """One curve, law, band, map or set of points.
 
-    Kinds: ``curve`` and ``law`` are points, joined if `line` is not empty; ``band`` fills the area from ``y_low`` to
-    ``y_high``; ``dots`` and the cells of a ``map`` are coloured by ``value``; ``absent`` are marks at the lower edge of
-    the panel. The variables of `data` are ``x``, ``y`` and ``value`` in the units of the axes, and the ends of their
-    intervals where these are known, such as ``y_low`` and ``y_high``. The coordinates of `data` are the parameters of
-    each point in SI. `what` is ``data``, the name of a law, or the reason why cases have no value. `bars` draws
-    intervals as bars instead of a band.
+    Kinds: ``curve`` and ``law`` consist of points, which are joined if `line` is not empty; ``band`` fills the area
+    from ``y_low`` to ``y_high``; ``dots`` and the cells of a ``map`` are coloured by ``value``; ``absent`` are marks at
+    the lower edge of the panel. The variables of `data` are ``x``, ``y`` and ``value`` in the units of the axes, and
+    the ends of their intervals where these are known, such as ``y_low`` and ``y_high``. The coordinates of `data` are
+    the parameters of each point in SI. `what` is ``data``, the name of a law, or the reason why cases have no value.
+    `bars` draws intervals as bars instead of a band.
     """
 
     kind: Kind
@@ -204,8 +204,8 @@ def _number(value: Any) -> str:
 
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
-    """Return the data of a trace: the given arrays (``x``, ``y``, ``value``), and the coordinates of `of` as
-    parameters. A `Mean` gives three arrays, such as ``y``, ``y_low`` and ``y_high``; unknown ends are left out.
+    """Return the data of a trace: the given arrays (``x``, ``y``, ``value``), with the parameters from `of`. A `Mean`
+    gives three arrays, such as ``y``, ``y_low`` and ``y_high``; unknown ends are left out.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -229,7 +229,7 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Rename a parameter that has the name of another column of the table."""
+    """Rename a parameter if another column of the table has the same name."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 

@@ -84,7 +84,7 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
 
 
 def symbols(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the labels of those coordinates whose label is not their name, for all given series together."""
+    """Return the labels of all coordinates that are not labelled with their own name, in any of the given series."""
     found = dict(SYMBOLS) if all(data.attrs.get("model") in models.NAMES for data in groups.values()) else {}
     for data in groups.values():
         own = set(data.dims) - set(data["status"].dims) if "status" in data else set()
@@ -166,7 +166,7 @@ def named(name: str, value: xr.DataArray) -> str:
 
 
 def short(number: float) -> str:
-    """Return a number with four digits, such as ``12340``; only numbers of more than ten places have an exponent."""
+    """Return a number with four digits, such as ``12340``; only numbers from 1e10 or below 1e-4 have an exponent."""
     return f"{float(f'{number:.4g}'):.10g}"
 
 

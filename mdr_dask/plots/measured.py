@@ -27,7 +27,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Return series to which the table of measurements in `file` is added, and figures that also show its points."""
+    """Return the series with the table of measurements in `file`, and the figures with its points."""
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
 

@@ -160,8 +160,8 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Set the ticks of a logarithmic axis. If the axis has less than two decades, its numbers are plain, such as 1, 2,
-    5, 10, 20 and 50.
+    """Set the ticks of a logarithmic axis. If the axis spans less than two decades, the numbers at its ticks are plain,
+    such as 1, 2, 5, 10, 20 and 50.
     """
     from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter
 

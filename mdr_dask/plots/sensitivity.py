@@ -9,7 +9,7 @@ from mdr_dask.plots import colours
 from mdr_dask.plots.figure import Axis, Figure, Mean, Panel, Trace, columns
 
 NAMES = {"first": "first order: alone", "total": "total: with interactions"}
-#: Vertical distance between the first-order index and the total index of an input, as a fraction of a row.
+#: Vertical distance between the first-order index and the total index of an input, divided by the row height.
 APART = 0.25
 
 

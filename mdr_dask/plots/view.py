@@ -20,7 +20,7 @@ from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: Largest number of panels for one output. Largest number of characters in one line of the text at a tick.
+#: `MOST_PANELS`: largest number of panels for one output. `LONGEST_WORD`: most characters in a line of text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
 #: In a figure of main effects: largest number of parameters, and largest number of cases that are drawn as points.
 MOST_EFFECTS, MOST_POINTS = 12, 5000
@@ -66,16 +66,16 @@ class View:
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
     def is_log(self, which: str, values: Any, how: labels.Quantity) -> bool:
-        """Return whether an axis is logarithmic. Unless the view requests it, an axis in degC is linear."""
+        """Return whether an axis is logarithmic. By default, an axis in degC is linear."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
         return not how.offset and labels.is_geometric(values) if self.log is None else which in self.log and positive
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameter with the most values, of all parameters with which an output varies. If the output has a
-    dimension of its own, such as time, this dimension is returned instead. In a sampled study, the result is empty, so
-    that the figure shows main effects.
+    """Of all parameters with which an output varies, return the one with the most values. If the output has a dimension
+    of its own, such as time, this dimension is returned instead. In a sampled study, the result is empty, so that the
+    figure shows main effects.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):

@@ -1,4 +1,4 @@
-"""Means and errors of all cases of a study. With these, the reader of the page can choose the axes of figures."""
+"""Means and errors of all cases of a study. The page draws them against axes that its reader chooses."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The page: one HTML file that contains all data and scripts.
 
 Nothing in a store can run as a script: the template escapes texts, data are a block of JSON, and the content security
-policy admits only scripts with the digests of this package.
+policy admits only this package's own scripts, identified by their digests.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
 
 
 def _read(file: Mapping[str, str]) -> bytes:
-    """Return the content of a file that a campaign names; raise StoreError if it has changed since the run."""
+    """Return the content of a file that a campaign names; raise StoreError if the file has changed since the run."""
     path = Path(file["path"])
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != file["sha256"]:

@@ -47,10 +47,10 @@ class Study:
     """The content of a page about one study.
 
     `understood` are tables that show how the campaign was understood: axes, fixed parameters and outputs. `failures`
-    are failures and warnings, in groups whose messages differ only in their numbers. `not_fitted` are the laws that
-    cannot be fitted and `not_drawn` the figures that cannot be drawn, both with the reasons. The data in `figures` are
-    made by the module `mdr_dask.report.figures`, those in `cases` by `mdr_dask.report.cases`. `rerun` are commands that
-    compute the study again, and `at_work` names the runs that are computing it now.
+    are failures and warnings, grouped by message without regard to its numbers. `not_fitted` are the laws that cannot
+    be fitted and `not_drawn` the figures that cannot be drawn, both with the reasons. The data in `figures` are made by
+    the module `mdr_dask.report.figures`, those in `cases` by `mdr_dask.report.cases`. `rerun` are commands that compute
+    the study again, and `at_work` names the runs that are computing it now.
     """
 
     url: str
@@ -140,7 +140,7 @@ def _study(
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure shows no errors: such figures come last on the page."""
+    """Return whether a figure has no error bars and no bands; such figures come last on the page."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 

@@ -217,7 +217,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its missing parents. Return the folders in which a folder may have been made."""
+    """Make a folder and its missing parents. Return the folders that may have a new entry."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]
@@ -262,7 +262,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic; it is for local files, and on servers that create a file in one request."""
+    """Return whether `create` is atomic, as it is for local files and on servers that create a file in one request."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem

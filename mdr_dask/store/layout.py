@@ -166,7 +166,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment that says how to open a study with series: opened as one dataset, it looks empty."""
+    """Return a comment on how to open a study with series, because the study looks empty when opened as one dataset."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"

@@ -56,7 +56,7 @@ class Blocks:
         return chunk_name(self.series, array, block, self.further[array])
 
     def has(self, block: BlockIndex) -> bool:
-        """Return whether a block lies in the grid."""
+        """Return whether the group has a block with this index."""
         return len(block) == len(self.grid) and all(0 <= i < n for i, n in zip(block, self.grid, strict=True))
 
 

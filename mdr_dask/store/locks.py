@@ -1,8 +1,8 @@
 """Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
-If the file system has locks, the operating system releases them when a process ends. Elsewhere, and at URLs, a run
-makes a claim: a file that only one process can create, and a second file that its owner regularly writes as a sign of
-life. A run holds another lock, the gate, while it checks which runs are active and while it lays out the study.
+If the file system has locks, the operating system releases them when a process ends. On other file systems, and at
+URLs, a run makes a claim: a file that only one process can create, and a second file that its owner regularly writes as
+a sign of life. A run also holds a lock named the gate while it looks for active runs or lays out the study.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ class Lock:
     owner: str
     # Number of the claim; None if the lock is one of the operating system.
     claim: int | None = None
-    # Whether the process of an earlier run crashed or was killed while it held this lock. For the exclusive lock, this
-    # also includes the locks of parts.
+    # Whether an earlier run crashed or was killed while it held this lock or, if this is the exclusive lock, a lock of
+    # a part.
     after_crash: bool = False
 
 
@@ -99,8 +99,8 @@ class Part:
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, from the position of the block among all blocks.
 
-        With 3 parts, the blocks belong in turn to the parts 1, 2, 3, then 2, 3, 1, then 3, 1, 2, and so on. If they
-        always belonged to 1, 2, 3, all blocks at one position on an axis of 3 blocks would belong to the same part.
+        With 3 parts, the blocks belong in turn to the parts 1, 2, 3, then 2, 3, 1, then 3, 1, 2, and so on. If the
+        order were always 1, 2, 3, all blocks at one position on an axis of 3 blocks would belong to the same part.
         """
         return cls((position + position // count) % count + 1, count)
 
@@ -146,7 +146,7 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
 
 @contextmanager
 def gate(url: str) -> Iterator[None]:
-    """Hold the gate of a study. Meanwhile no other run can start, and no other run can lay out the study."""
+    """Hold the gate of a study: the lock that every run needs to start and to lay out the study."""
     start, is_reported = time.monotonic(), False
     with ExitStack() as held:
         while True:
