@@ -166,7 +166,7 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     if status.shape != shape or not np.isin(status, (Status.DONE, Status.NOT_CONVERGED, Status.FAILED)).all():
         raise ValueError(f"status: expected DONE, NOT_CONVERGED or FAILED in shape {shape}, got {status}")
     if not messages.keys() <= set(np.ndindex(shape)):
-        raise ValueError(f"messages: expected places in shape {shape}, got {list(messages)}")
+        raise ValueError(f"messages: expected keys (case, realisation) within the shape {shape}, got {list(messages)}")
     status = status.astype(np.int8)
     result = replace(result, status=status, messages=messages, solves=int(result.solves))
     if (status == Status.FAILED).all():

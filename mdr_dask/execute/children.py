@@ -148,7 +148,7 @@ def serve(model: str, numbers: list[int]) -> None:
         if status == 0:
             pipe.close()
             continue
-        with suppress(OSError):  # fails if the driver has died; the new child then ends at once
+        with suppress(OSError):  # if the driver has died, sending fails, and the new child ends at once
             pipe.send(Crash(_describe(status)))
         served[_fork(pipe, pipes)] = pipe
 

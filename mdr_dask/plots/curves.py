@@ -117,11 +117,11 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str = "", first: int = 0) -> Family:
     """Split a series into curves against the parameter `along`.
 
-    The curves differ in `by`, or without `by` in all other axes. If there are too few colours for this, colours show
-    the values of one axis, and line styles show those of a second axis if it has few values. All axes that are not
-    shown are fixed at their middle value. If an axis shown by colours has more values than there are colours, numbers
-    get a colour bar, and of words only as many are drawn as there are colours. The label of each curve begins with the
-    name `series`. The first curve gets the colour with the number `first`.
+    The curves differ in the parameter `by` or, without `by`, in all other axes. If there are too few colours for this,
+    colours show the values of one axis, and line styles show those of a second axis if it has few values. All axes that
+    are not shown are fixed at their middle value. If an axis shown by colours has more values than there are colours,
+    numbers get a colour bar, and of words only as many are drawn as there are colours. The label of each curve begins
+    with the name `series`. The first curve gets the colour with the number `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")

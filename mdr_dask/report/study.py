@@ -140,7 +140,7 @@ def _study(
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure has no error bars and no bands; such figures come last on the page."""
+    """Return whether a figure shows no intervals; such figures come last on the page."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 

@@ -87,7 +87,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # left out, so that no run can extend the copy
+        if value is not None and name != "mdr_dask_layout"  # without it, no run can extend the copy
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:
