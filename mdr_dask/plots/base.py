@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 class Plot:
     """A figure that has a name. Its function `draw` receives the groups of a store, indexed by the name of the series.
 
-    `models` are the names of the models that have this figure; if it is empty, all models have it. `summary` names the
-    quantities on both axes. `fitted` is true if the figure shows a fit; such a figure takes a long time in a large
-    study.
+    `models` are the names of the models that have this figure; all models have it if there are no names. `summary`
+    names the quantities on both axes. `fitted` is true if the figure shows a fit; such a figure takes a long time in a
+    large study.
     """
 
     name: str
@@ -67,14 +67,14 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return the numbers of results that failed, did not converge or are missing, as one text for each of these
-    reasons.
-    """
+    """Return up to three texts: the numbers of results that failed, that did not converge, and that are missing."""
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in reasons.items()}
-    return [f"{count} of {total} results of the store, which {words}" for words, count in counts.items() if count]
+    return [
+        f"{count} of {total} results of the store, because they {words}" for words, count in counts.items() if count
+    ]
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:

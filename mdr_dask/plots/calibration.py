@@ -51,8 +51,9 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset, list[str]]:
-    """Calibrate the first series that can be compared with its table of measurements. The last value returned is a list
-    of texts that say why the other series are not drawn.
+    """Calibrate the first series that can be compared with its table of measurements.
+
+    The last value returned is a list of texts that say why the other series are not drawn.
     """
     reasons = {}
     for name, dataset in groups.items():
@@ -67,8 +68,9 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
-    """Divide the measured points into curves: the points of a curve differ only in the condition `main`. The curves are
-    indexed by their labels. If there are more curves than colours, all points form one curve.
+    """Divide the measured points into curves: the points of a curve differ only in the condition `main`.
+
+    The curves are indexed by their labels. If there are more curves than colours, all points form one curve.
     """
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))

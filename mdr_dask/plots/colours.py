@@ -37,8 +37,9 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return the line style and the marker of a curve. They are the same for all curves, unless all colours are grey or
-    the requested style defines line styles or markers.
+    """Return the line style and the marker of a curve.
+
+    All curves have the same line style and marker, unless all colours are grey or the requested style defines them.
     """
     from matplotlib.colors import to_rgb
 
@@ -49,7 +50,7 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return a colour bar for some values. By default, it is logarithmic if `is_geometric` is true for the values."""
+    """Return a colour bar for some values. By default, it is logarithmic if the values suit a logarithmic axis."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)

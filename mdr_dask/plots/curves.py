@@ -31,8 +31,8 @@ class Family(NamedTuple):
 
     `bar` is a colour bar if the curves have more values than there are colours, otherwise None. `held` are the
     parameters that have one value in all curves. `left_out` are texts about the values that are not drawn. In a sampled
-    study, several parameters change from point to point; `varying` are those that neither the axis nor the colours
-    show.
+    study, several parameters change from point to point; `varying` are the parameters among
+    these that neither the axis nor the colours show.
     """
 
     curves: list[Curve]
@@ -117,11 +117,12 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str = "", first: int = 0) -> Family:
     """Split a series into curves against the parameter `along`.
 
-    The curves differ in the parameter `by` or, without `by`, in all other axes. If there are too few colours for this,
-    colours show the values of one axis, and line styles show those of a second axis if it has few values. All axes that
-    are not shown are fixed at their middle value. If an axis shown by colours has more values than there are colours,
-    numbers get a colour bar, and of words only as many are drawn as there are colours. The label of each curve begins
-    with the name `series`. The first curve gets the colour with the number `first`.
+    The curves differ in the parameter `by`. Without `by`, there is a curve for every combination of values of the other
+    axes. If these are more curves than colours, colours show the values of one axis, and line styles show those of a
+    second axis if it has few values. All axes that are not shown are fixed at their middle value. If the axis shown by
+    colours has more values than there are colours, a colour bar shows the values if they are numbers; if they are
+    words, some of them are left out. The label of each curve begins with the name `series`. The first curve gets the
+    colour with the number `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
@@ -162,8 +163,9 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Choose the axis shown by colours, and possibly a second axis shown by line styles, so that as many curves as
-    possible are drawn.
+    """Choose the axis shown by colours, and possibly a second axis shown by line styles.
+
+    The choice is the one with the largest number of curves.
     """
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
@@ -260,8 +262,9 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 
 
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
-    """Return a text with the fixed parameters, for a title: first those that are axes of the study, then the others
-    that have a symbol.
+    """Return a text with the fixed parameters, for a title.
+
+    It begins with the parameters that are axes of the study. Of the others, it contains those that have a symbol.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
@@ -274,7 +277,7 @@ def _is_known(value: xr.DataArray) -> bool:
 
 
 def parameters_of(data: xr.Dataset) -> dict[str, Any]:
-    """Return all parameters of a series as stored, including words such as the names of rules."""
+    """Return all parameters of a series as stored: numbers, and words such as the names of rules."""
     found: dict[str, Any] = json.loads(data.attrs.get("parameters", "{}"))
     return found
 

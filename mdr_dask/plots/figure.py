@@ -156,11 +156,10 @@ class Figure:
             self.warnings = [*self.warnings, f"does the fit hold? {law_holds}"]
 
     def table(self) -> pd.DataFrame:
-        """Return a table with a row for every point. ``x``, ``y`` and ``value`` are in the units of the axes,
-        parameters in SI.
+        """Return a table with a row for every point.
 
-        Parameters that are the same for all points are in ``attrs["held"]``, and the units of all parameters in
-        ``attrs["units"]``.
+        ``x``, ``y`` and ``value`` are in the units of the axes, parameters in SI. Parameters that are the same for all
+        points are in ``attrs["held"]``, and the units of all parameters in ``attrs["units"]``.
         """
         frames = [trace.frame().assign(panel=k + 1) for k, panel in enumerate(self.panels) for trace in panel.traces]
         frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
@@ -234,8 +233,9 @@ def _apart(name: Any) -> str:
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
-    """Return the edges of cells around the values of an axis: halfway between neighbouring values, or between their
-    logarithms.
+    """Return the edges of cells around the values of an axis: halfway between neighbouring values.
+
+    If `log` is true, the edges are halfway between the logarithms of neighbouring values.
     """
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)

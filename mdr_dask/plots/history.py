@@ -1,4 +1,4 @@
-"""Friction against time through a jump of the velocity, or along any history of velocity and load."""
+"""Friction against time before and after a jump of the velocity, or during any history of velocity and load."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ STEADY = "steady state at the end"
 
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw friction against time, one column of panels for each series. Velocity and normal force have a panel only if
-    they change.
+    """Draw friction against time, one column of panels for each series.
+
+    Velocity and normal force have panels only if they change.
     """
     needed = {BEFORE, JUMP, FRICTION}
     found = {name: data for name, data in groups.items() if needed <= data.keys() and data[FRICTION].notnull().any()}

@@ -84,7 +84,7 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
 
 
 def symbols(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the labels of all coordinates that are not labelled with their own name, in any of the given series."""
+    """Return the labels of coordinates of the given series. Any other coordinate is labelled with its name."""
     found = dict(SYMBOLS) if all(data.attrs.get("model") in models.NAMES for data in groups.values()) else {}
     for data in groups.values():
         own = set(data.dims) - set(data["status"].dims) if "status" in data else set()

@@ -26,8 +26,9 @@ LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", 
 
 
 class Law(NamedTuple):
-    """The name of a law in the legend, and a function that computes it in SI from parameters and the outputs
-    `NEEDED`.
+    """A law of an output: its name in the legend, and a function that computes the output in SI.
+
+    The function uses the parameters and the outputs `NEEDED`.
     """
 
     name: str

@@ -27,7 +27,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Return the series with the table of measurements in `file`, and the figures with its points."""
+    """Return the series with the table of measurements in `file`, and the figures with the points of this table."""
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
 
@@ -56,7 +56,9 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
         raise DataError(f"{measured.source}: expected a column with a parameter of the study ({axes}), got none")
     if not panels:
         known = ", ".join(measured.conditions)
-        raise DataError(f"{measured.source} holds {measured.output} against {known}, which this figure does not show")
+        raise DataError(
+            f"{measured.source} contains {measured.output} against {known}, but no panel of this figure has these axes"
+        )
     drawn = sum(_add(panel, measured, data) for panel in panels)
     if drawn < measured.values.size:
         rest = measured.values.size - drawn
@@ -65,7 +67,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
-    """Return a warning if all measured values are above, or all are below, all results of a study."""
+    """Return a warning if the measured values are all above or all below the results of a study."""
     low, high = float(data[measured.output].min()), float(data[measured.output].max())
     if measured.values.min() <= high and measured.values.max() >= low:
         return []
@@ -125,8 +127,9 @@ def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
 
 
 def _near(axis: Axis, drawn: FloatArray, places: FloatArray) -> np.ndarray:
-    """Return a mask of the measured points that are close enough to the curves along one axis. If the curves go from 1
-    to 3, points from -1 to 5 are close enough; points farther away would squeeze the curves.
+    """Return a mask of the measured points that are close enough to the curves along one axis.
+
+    If the curves go from 1 to 3, points from -1 to 5 are close enough; points farther away would squeeze the curves.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # a logarithmic axis cannot show zero or negative numbers
         drawn, places = (np.log(each) if axis.log else each for each in (drawn, places))

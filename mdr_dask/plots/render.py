@@ -56,7 +56,7 @@ def table_beside(path: str | Path) -> Path:
     """Return the path for the table of a figure; raise DataError if a file of another kind already has this path."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
-        raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
+        raise DataError(f"{beside} exists and is not the table of a figure; choose another name for the figure")
     return beside
 
 

@@ -71,8 +71,9 @@ def _named(name: str, values: xr.DataArray) -> Json:
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
-    """Return a list with one value for each case. If `values` do not depend on a dimension of the cases, they are
-    repeated along it.
+    """Return a list with one value for each case.
+
+    If the cases have a dimension that `values` lack, the values are repeated along this dimension.
     """
     along = xr.DataArray(np.asarray(values), dims=dims)
     return numbers(along.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel())

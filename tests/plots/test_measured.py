@@ -64,7 +64,7 @@ def test_far_points_do_not_squeeze_the_curves(groups, tmp_path, far):
 
 def test_figures_of_other_quantities_are_refused(groups, tmp_path):
     table = "velocity [m/s],friction_coefficient\n0.01,2e-3\n0.02,5e-3\n"
-    with pytest.raises(DataError, match=r"rig.csv holds friction_coefficient against velocity"):
+    with pytest.raises(DataError, match=r"rig.csv contains friction_coefficient against velocity"):
         drawn(groups, tmp_path, table, "force")
 
 
