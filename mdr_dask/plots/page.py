@@ -74,7 +74,7 @@ def requested(
 
 @contextmanager
 def drawing_for(page: Page) -> Iterator[None]:
-    """Use a page for all figures that are drawn within a ``with`` statement."""
+    """Apply the settings of a page to all figures that are drawn within a ``with`` statement."""
     from matplotlib import rc_context, rc_params_from_file
     from matplotlib.style import context, library
 

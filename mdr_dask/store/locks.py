@@ -51,8 +51,8 @@ SILENCE = 60.0
 #: Time in s for which a process tries to acquire a lock that another process holds. The other process may hold the lock
 #: only for an instant, to check whether the lock is free.
 GLANCE = 0.5
-#: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
-#: message is logged, so that a user reads it within five seconds.
+#: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: a message is logged if a process
+#: has waited for the gate this long (in s), so that a user reads it within five seconds.
 POLL, PATIENCE = 0.05, 4.0
 #: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}

@@ -91,7 +91,9 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:
-            raise StoreError(f"{path}: netCDF needs h5netcdf: pip install 'mdr_dask[netcdf]', or write FILE.zarr")
+            raise StoreError(
+                f"{path}: netCDF needs h5netcdf: pip install 'mdr_dask[netcdf]', or choose a name that ends in .zarr"
+            )
         plain.to_netcdf(path, engine="h5netcdf")
         return
     with warnings.catch_warnings():
