@@ -65,8 +65,9 @@ class Wearing(NamedTuple):
         """Return the worn profile by simulating every cycle."""
         if self.stick == 0 or self.amount > FEW:
             return None
-        held = self.held
-        return self.heights(literal(self.profile, self.stick, self.amount, cells=cells, constant_force=held))
+        radii, height, _ = literal(self.profile, self.stick, self.amount, cells=cells, constant_force=self.held)
+        worn = height - self.profile.height(radii)
+        return Found(self.profile.height(self.radii) + np.interp(self.radii, radii, worn, right=0.0))
 
 
 def wearing(slips: bool, held: bool, random: np.random.Generator) -> tuple[Wearing, Truth]:
