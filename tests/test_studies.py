@@ -172,7 +172,7 @@ UNFIT = [
     (lambda study: mdr_dask.plot(study, "stribeck"), "no figure of sliding_friction is called 'stribeck'"),
     (lambda study: mdr_dask.aggregate(study, "medan"), "no statistic is called 'medan' (did you mean 'mean'?)"),
     (lambda study: mdr_dask.plot(xr.Dataset(), "velocity"), "expected a study as returned by run or open_study"),
-    (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps one"),
+    (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps a single"),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
 ]
 

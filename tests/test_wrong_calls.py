@@ -19,7 +19,7 @@ WRONG = [
     ("show STORE -o x.csv --json", "--json and --output"),
     ("show STORE -o x.nc --sort velocity", ".csv", "--sort"),
     ("plot STORE friction_coefficient --over velocity --effects", "--over once", "--effects"),
-    ("plot STORE friction_coefficient --over velocity --log q", "xyz", "'q'"),
+    ("plot STORE friction_coefficient --over velocity --log q", "x, y and z", "'q'"),
     ("plot STORE friction_coefficient --over velocity --size 85", "'85mm'"),
     # names
     ("models nobody", "'nobody'", "known: sliding_friction"),
