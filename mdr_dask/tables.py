@@ -13,7 +13,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -245,9 +244,6 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     names, units = _names_and_units(grid, head)
     _require_even(grid, rows, len(units), head)
     cells = _with_points(grid, rows)[:, : len(units)]
-    if names and not is_name and _ends_with_mean(cells, grid.number[rows]):
-        notes = (f"{grid.lines[rows[-1]]}: the mean of the rows above", *notes)
-        rows, stated, cells = rows[:-1], stated[:-1], cells[:-1]
     first = grid.lines[rows[0] if head.names is None else head.names]
     sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, notes)
     known = [plain(name) for name in names]
@@ -480,21 +476,6 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
     kept = str.maketrans(decimal, ".", "".join(_DECIMALS).replace(decimal, "") + _GROUPS)
     cells[number] = [text.translate(kept) for text in texts]
     return cells
-
-
-def _ends_with_mean(cells: Cells, number: BoolArray) -> bool:
-    """Return whether the last row contains the means of the rows above.
-
-    Each of its numbers must be the mean of its column, and at least two of these columns must not be constant.
-    """
-    varied = 0
-    for column in np.flatnonzero(number[-1, : cells.shape[1]]) if len(cells) > 3 else ():
-        text, above = cells[-1, column], cells[:-1, column][number[:-1, column]].astype(np.float64)
-        last_digit = float(f"1e{Decimal(text).as_tuple().exponent}")
-        if not (above.size and np.isclose(float(text), above.mean(), rtol=1e-12, atol=last_digit / 2)):
-            return False
-        varied += above.min() < above.max()
-    return varied > 1
 
 
 def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pandas as pd
 import pytest
-from instrument_layouts import DMA, FRICTION, READ, REFUSED, TRIOS
+from instrument_layouts import DMA, READ, REFUSED, TRIOS
 
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
@@ -57,12 +57,6 @@ def test_lines_below_the_numbers_are_named():
     read = read_table(text, "v.csv", columns)
     assert read["storage modulus"].tolist() == [2e6, 3e6]
     assert read.remark == "lines below the numbers, left out: '* limit', 'Mean', 'end of measurement'"
-
-
-def test_a_mean_without_a_label_is_left_out_and_named():
-    read = read_table("v [mm/s];mu\n1,0;0,5\n4,0;0,62\n7,0;0,68\n\n4,0;0,60\n", "v.csv", FRICTION)
-    assert read["velocity"].tolist() == [1e-3, 4e-3, 7e-3]
-    assert "'line 6: the mean of the rows above'" in read.remark
 
 
 def test_pairs_of_columns_become_a_table_with_a_temperature():
