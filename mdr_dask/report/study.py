@@ -345,7 +345,7 @@ def _rerun(url: str, held: Mapping[str, Any]) -> list[str]:
     file = shlex.quote(str(held.get("source") or "campaign.yaml"))
     place = shlex.quote(url)
     return [
-        f"pip install mdr_dask=={held['versions']['mdr_dask']}",
+        f"# with mdr_dask {held['versions']['mdr_dask']}",
         f"mdr-dask run {file} --store {place}",
         f"mdr-dask verify {place}",
         f"mdr-dask report {place} -o report.html",
