@@ -137,6 +137,7 @@ class _Maker:
         question = self._question
         named = {name for text in (question.where, *question.sort) if text for name in parse(text).names}
         needs = self._data[[*needed(self._data, named), *({STATUS, COUNTS, CASES} & self._data.data_vars.keys())]]
+        needs = needs.assign_coords({dim: self._data[dim] for dim in self._dims if dim in self._data.coords})
         found = [(places, *self._keys(rows)) for places, rows in self._boxes(needs, ROWS, whole=True)]
         places, *keys = (np.concatenate(part) for part in zip(*found, strict=True))
         words_by_rank = [pd.factorize(key, sort=True)[0] if key.dtype.kind == "O" else key for key in keys]
@@ -178,7 +179,7 @@ class _Maker:
     def _kept(self, rows: xr.Dataset) -> Any:
         needed = np.ones(rows.sizes["row"], dtype=bool)
         if STATUS in rows and "realisation" in rows[STATUS].dims:
-            needed = ~(rows[STATUS] == Status.NOT_NEEDED).all("realisation").to_numpy()
+            needed &= ~(rows[STATUS] == Status.NOT_NEEDED).all("realisation").to_numpy()
         if not self._question.where or self._question.group_by:
             return needed
         return needed & np.broadcast_to(Columns(rows).truth(self._question.where).to_numpy(), rows.sizes["row"])

@@ -213,9 +213,20 @@ def test_boxes_follow_the_rows_whatever_their_size(study, most, monkeypatch):
     pd.testing.assert_frame_equal(rows(study, limit=4).iloc[:4], rows(study.chunk(velocity=2)).iloc[:4])
 
 
-def test_a_study_of_one_case_and_no_axis(study):
-    one = study.isel(normal_force=2, velocity=3)
+@pytest.mark.parametrize("parts", [{}, {"where": "radius >= 0"}, {"statistics": None}, {"sort": ("radius", "status")}])
+@pytest.mark.parametrize("axes", [{"normal_force": 2, "velocity": 3}, {"normal_force": [2], "velocity": [3]}])
+def test_a_study_of_one_case_has_every_place_of_a_profile(study, axes, parts):
+    one = study.isel(axes)
+    places = 2 * one.sizes["realisation"] if "statistics" in parts else 2
+    assert len(rows(one, outputs=("trace",), **parts)) == len(rows(one, columns=("radius", "trace"), **parts)) == places
     assert rows(one, outputs=("rms_slope",))["rms_slope_mean"].tolist() == pytest.approx([0.02])
+
+
+@pytest.mark.parametrize("sort", ["-radius", "-velocity"])
+def test_a_table_can_be_sorted_by_an_axis_alone(study, sort):
+    found = rows(study, outputs=("trace",), sort=(sort,))
+    assert len(found) == 24
+    assert (np.diff(found[sort[1:]]) <= 0).all()
 
 
 def test_arrays_hold_the_same_as_rows(study):
