@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.peers import OURS, installed
 from benchmarks.rows import Row, timed_in_turns
 from benchmarks.surfaces.punches import areal_surface
-from mdr_dask.physics.surfaces import measured, roughness
+from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
 from mdr_dask.physics.surfaces.spectrum import self_affine
 from mdr_dask.physics.surfaces.waves import waves_of
@@ -41,7 +41,7 @@ def maps(shortest: int) -> tuple[np.ndarray, float]:
 
 def of_line(height):
     waves = waves_of(height)
-    return measured.rms_height(height), waves.rms_slope(), np.abs(waves.coefficients) ** 2
+    return height.std(), waves.rms_slope(), np.abs(waves.coefficients) ** 2
 
 
 def of_map(height):

@@ -168,10 +168,10 @@ class Measured:
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
         """Return the lines without mean and tilt, so that the two ends of a line meet without a large step."""
-        from mdr_dask.physics.surfaces.measured import detrended, rms_height
+        from mdr_dask.physics.surfaces.measured import detrended
 
         lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]
-        first, second = (line / rms_height(line) if self.scaled else line for line in lines)
+        first, second = (line / line.std() if self.scaled else line for line in lines)
         return first, second
 
 

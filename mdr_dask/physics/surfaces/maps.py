@@ -16,15 +16,11 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 Order = Literal["none", "mean", "plane", "parabola"]
 
-LEAST_POINTS = 16  # smallest number of points along each axis
 MOST_MISSING = 0.05  # largest accepted fraction of missing points; missing points are filled
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
-BAND = 128  # number of rows that are processed at once; these rows fit into the processor's cache
 SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
 MOST_SCATTER = 0.02  # an octave is used if scatter alone causes angular harmonics with at most this mean square
-FLAT = 1e-12  # a map is flat if its range of heights is at most this fraction of its largest height
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
-HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent with the Hann window
 
 
 class SurfaceMap(NamedTuple):
@@ -43,9 +39,10 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     The standard deviation is estimated from the median of the deviations.
     """
     height = surface.height
-    away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
-    for first in range(0, away.shape[0], BAND):
-        away[first : first + BAND] = _off_neighbours(height[first : first + BAND + 2])
+    middle = height[1:-1, 1:-1]
+    along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
+    across = np.abs(middle - 0.5 * (height[1:-1, 2:] + height[1:-1, :-2]))
+    away = np.minimum(along, across)  # a point on a crest is far from its neighbours across the crest
     limit = FAR * 1.4826 * float(np.nanmedian(away[:: 1 + away.shape[0] // 1000, :: 1 + away.shape[1] // 1000]))
     found = np.zeros(height.shape, bool)
     if not limit > 0:
@@ -61,22 +58,11 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     return found
 
 
-def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return the distance of each inner point from the mean of its two neighbours, along x or along y.
-
-    The smaller of the two distances is used, because a point on a crest is far from its neighbours across the crest.
-    """
-    middle = height[1:-1, 1:-1]
-    along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
-    across = np.abs(middle - 0.5 * (height[1:-1, 2:] + height[1:-1, :-2]))
-    return np.asarray(np.minimum(along, across, out=along), dtype=np.float64)
-
-
 def require_points(surface: SurfaceMap) -> None:
     """Raise DataError if an axis has too few points, or if the fraction of missing points exceeds `MOST_MISSING`."""
     height = surface.height
-    if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
-        raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")
+    if height.ndim != 2 or min(height.shape) < 16:
+        raise DataError(f"expected a map of 16 x 16 points or more, got {height.shape}")
     require_few_missing(~np.isfinite(height))
 
 
@@ -97,24 +83,21 @@ def filled(surface: SurfaceMap) -> SurfaceMap:
 
 def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
     """Return heights in which each missing point is the mean of its four neighbours."""
-    number = np.full(height.shape, -1)
-    number[missing] = np.arange(np.count_nonzero(missing))
-    size, diagonal, right = number.max() + 1, np.zeros(number.max() + 1), np.zeros(number.max() + 1)
-    pairs = []
-    for axis in (0, 1):
-        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            one, other = ((here, slice(None)), (there, slice(None))) if axis == 0 else ((..., here), (..., there))
-            inner = missing[one]
-            row, column = number[one][inner], number[other][inner]
-            diagonal[row] += 1
-            known = column < 0
-            right[row[known]] += height[other][inner][known]
-            pairs.append((row[~known], column[~known]))
-    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    matrix = sparse.diags_array(diagonal) - sparse.coo_array((np.ones(rows.size), (rows, columns)), (size, size))
+    # a frame around the map gives every point four neighbours; heights of missing points and of the frame are 0
+    places = np.flatnonzero(np.pad(missing, 1))
+    width = height.shape[1] + 2
+    neighbours = places[:, None] + [-width, width, -1, 1]
+    number = np.full((height.shape[0] + 2) * width, -1)
+    number[places] = np.arange(places.size)
+    columns = number[neighbours]
+    row, side = np.nonzero(columns >= 0)
+    inside = np.pad(np.ones(height.shape), 1).ravel()[neighbours].sum(axis=1)
+    right = np.pad(np.where(missing, 0.0, height), 1).ravel()[neighbours].sum(axis=1)
+    between = sparse.coo_array((np.ones(row.size), (row, columns[row, side])), (places.size, places.size))
     filled_in = height.copy()
-    start = np.full(size, float(np.mean(height[~missing])))
-    filled_in[missing], _ = sparse.linalg.cg(matrix.tocsr(), right, start, rtol=1e-10, maxiter=2000)
+    start = np.full(places.size, float(np.mean(height[~missing])))
+    matrix = (sparse.diags_array(inside) - between).tocsr()
+    filled_in[missing], _ = sparse.linalg.cg(matrix, right, start, rtol=1e-10, maxiter=2000)
     return filled_in
 
 
@@ -133,11 +116,8 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
     gram = np.array([[x ** (a + c) @ known @ y ** (b + d) for c, d in wanted] for a, b in wanted])
     right = [x**a @ height @ y**b for a, b in wanted]
     height = surface.height.copy()
-    terms = [(factor * x**a, y**b) for factor, (a, b) in zip(np.linalg.solve(gram, right), wanted, strict=True)]
-    for first in range(0, x.size, BAND):
-        rows = slice(first, first + BAND)
-        for along, across in terms:
-            height[rows] -= along[rows, None] * across
+    for factor, (a, b) in zip(np.linalg.solve(gram, right), wanted, strict=True):
+        height -= np.outer(factor * x**a, y**b)
     return SurfaceMap(height, surface.size)
 
 
@@ -234,10 +214,13 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()
-    if not np.ptp(height) > FLAT * np.max(np.abs(surface.height), initial=0.0):
+    if not np.ptp(height) > 0:
         raise DataError("expected a rough map, got a flat one")
+    independent = 1.0
     if hann:
-        height *= hann_disc(points, size)
+        window = hann_disc(points, size)
+        height *= window
+        independent = 1 / float(np.mean(np.square(window**2)))  # because of the window, adjacent waves are correlated
     waves = fft.rfft2(height, overwrite_x=True)
     power = np.abs(waves) ** 2 / height.size**2
     power[0, 0] = 0.0
@@ -245,7 +228,7 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     power[:, 1 : (points[1] + 1) // 2] *= 2
     del waves, height
     q_x, q_y = wavenumbers(points, size)
-    return _rings(power, q_x, q_y, points, size, HANN_MODES * (min(size) / max(size)) if hann else 1.0)
+    return _rings(power, q_x, q_y, points, size, independent)
 
 
 def _rings(
@@ -254,7 +237,7 @@ def _rings(
     q_y: FloatArray,
     points: tuple[int, int],
     size: tuple[float, float],
-    modes: float,
+    independent: float,
 ) -> MapSpectrum:
     """Return the spectrum in rings of constant wave number, from the squared amplitudes (power) of the waves."""
     step = 2 * np.pi / min(size)
@@ -286,7 +269,7 @@ def _rings(
         wavenumber=np.asarray(number * step, dtype=np.float64),
         density=total / (2 * np.pi * number * step**2),
         count=count,
-        independent=modes,
+        independent=independent,
         rms_height=float(np.sqrt(np.sum(power))),
         slopes=slopes,
         angular=np.array([second / safe, fourth / safe], dtype=np.complex128),

@@ -1,4 +1,4 @@
-"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid, and rms values."""
+"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid, and rms slope."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ Detrend = Literal["none", "mean", "line", "parabola"]
 ORDERS: dict[str, int] = {"mean": 0, "line": 1, "parabola": 2}
 UNEVEN = 1e-3
 """Relative difference up to which spacings count as uniform. It is not 0, because instruments print few digits."""
-
-LEAST_POINTS = 8
 
 
 @dataclass(frozen=True)
@@ -63,8 +61,8 @@ def measured_line(
 
 def _ordered(position: ArrayLike, height: ArrayLike) -> tuple[FloatArray, FloatArray]:
     x, z = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (position, height))
-    if x.size != z.size or x.size < LEAST_POINTS:
-        raise DataError(f"a measured line needs {LEAST_POINTS} or more pairs x, z, got {x.size} and {z.size}")
+    if x.size != z.size or x.size < 8:
+        raise DataError(f"a measured line needs 8 or more pairs x, z, got {x.size} and {z.size}")
     if not np.all(np.isfinite(x) & np.isfinite(z)):
         raise DataError("a measured line must be finite: fill the points that the instrument left out")
     if x[0] > x[-1]:
@@ -99,11 +97,6 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
     if longest > 0:
         waves[(number > 0) & (number < length / longest * (1 - 1e-12))] = 0
     return np.asarray(np.fft.irfft(waves, height.size), dtype=np.float64)
-
-
-def rms_height(height: FloatArray) -> float:
-    """Return the rms height about the mean, m."""
-    return float(np.std(height))
 
 
 def rms_slope(height: FloatArray, length: float) -> float:

@@ -18,7 +18,6 @@ from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
-BINS = 10  # number of bins per decade of the wave number
 BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
 NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q exceeds this; for roughness, it is -1 or less
 NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
@@ -56,18 +55,18 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
     last = (points - 1) // 2  # without the wave that is two spacings long, whose phase is unknown
-    independent = len(lines) / (1.94 if hann else 1.0)  # because of the window, adjacent waves are correlated
+    independent = len(lines) / float(np.mean(window**4))  # because of the window, adjacent waves are correlated
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
 
 def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
-    """Average a spectrum in logarithmic bins; the power in each bin is preserved.
+    """Average a spectrum in ten logarithmic bins per decade; the power in each bin is preserved.
 
     `independent` is the number of statistically independent squared amplitudes per wave; it determines the standard
     error. `count` is the number of waves at each wave number, 1 by default.
     """
     count = np.ones(wavenumber.size) if count is None else count
-    bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * BINS).astype(int)
+    bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * 10).astype(int)
     _, member = np.unique(bins, return_inverse=True)
     total = np.bincount(member, count)
     q = np.exp(np.bincount(member, count * np.log(wavenumber)) / total)
@@ -110,10 +109,7 @@ def of_cut(cut: Cut) -> Spectrum:
     basis[rows, columns, where] = 1 - share
     basis[rows, columns, where + 1] += share
     steps = np.diff(np.log(knots))
-    slopes = np.zeros((steps.size, knots.size))
-    slopes[np.arange(steps.size), np.arange(steps.size)] = -1 / steps
-    slopes[np.arange(steps.size), np.arange(steps.size) + 1] = 1 / steps
-    bends = np.diff(slopes, axis=0) / BEND
+    bends = np.diff(np.diff(np.eye(knots.size), axis=0) / steps[:, None], axis=0) / BEND
 
     def residual(logs: FloatArray) -> FloatArray:
         found = np.sum(weight * np.exp(basis @ logs), axis=1)

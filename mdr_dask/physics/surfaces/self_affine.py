@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.scans import Cut
@@ -13,7 +14,7 @@ from mdr_dask.physics.surfaces.scans import Cut
 LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spectra deviate from power laws
 LEAST_BINS = 5  # smallest number of bins to which a power law is fitted
 LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
-CHI_SQUARED = 3.84  # 95 % quantile of chi squared for one parameter
+DEVIATIONS = float(ndtri(0.975))  # half width of a 95 % interval in standard deviations
 # limits of the slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
 STEEPEST, FLATTEST = -6.0, -1.0
 ABOVE_NOISE = 2.0  # the spectrum counts as roughness if it exceeds the noise by this factor
@@ -96,12 +97,12 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     allowed = [
         ends
         for ends, fit in fits.items()
-        if fit.chi_squared <= best.chi_squared + scale * CHI_SQUARED
+        if fit.chi_squared <= best.chi_squared + scale * DEVIATIONS**2
         and (ends[0] > 0) == (first > 0)
         and (ends[1] < last) == (end < last)
     ]
     slopes = [
-        fits[ends].slope + sign * 1.96 * np.sqrt(scale) * fits[ends].error for ends in allowed for sign in (-1, 1)
+        fits[ends].slope + sign * DEVIATIONS * np.sqrt(scale) * fits[ends].error for ends in allowed for sign in (-1, 1)
     ]
     low, high = -1 - max(slopes) / 2, -1 - min(slopes) / 2
 

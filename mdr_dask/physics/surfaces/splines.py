@@ -29,15 +29,11 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     return series(waves * _closest(waves.size, nodes), nodes)
 
 
-def through(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return the spline that interpolates a sum of waves at its nodes; arguments and result as in `closest`."""
-    return series(waves * _through(waves.size, nodes), nodes)
-
-
 def through_heights(height: FloatArray) -> FloatArray:
     """Return the coefficients, shape (nodes,), of the spline through the heights of a closed line, shape (nodes,)."""
     phase = 2 * np.pi * np.arange(height.size // 2 + 1) / height.size
-    return np.asarray(fft.irfft(fft.rfft(height) / _at_nodes(phase), height.size), dtype=np.float64)
+    at_nodes = (2 + np.cos(phase)) / 3  # Fourier transform of 1/6, 4/6, 1/6, the values of the B-spline at the nodes
+    return np.asarray(fft.irfft(fft.rfft(height) / at_nodes, height.size), dtype=np.float64)
 
 
 def heights(spline: FloatArray) -> FloatArray:
@@ -48,27 +44,11 @@ def heights(spline: FloatArray) -> FloatArray:
 @lru_cache(maxsize=8)
 def _closest(modes: int, nodes: int) -> FloatArray:
     """Return the factors that convert the waves to the coefficients of the least-squares spline."""
-    phase = _phases(modes, nodes)
+    phase = 2 * np.pi * np.arange(1, modes + 1) / nodes  # from one node to the next
     cosine = np.cos(phase)
     transform = np.sinc(phase / (2 * np.pi)) ** 4
     images = (2416 + 2382 * cosine + 240 * (2 * cosine**2 - 1) + 2 * (4 * cosine**3 - 3 * cosine)) / 5040
     return np.asarray(transform / images)
-
-
-@lru_cache(maxsize=8)
-def _through(modes: int, nodes: int) -> FloatArray:
-    """Return the factors that convert the waves to the coefficients of the interpolating spline."""
-    return 1 / _at_nodes(_phases(modes, nodes))
-
-
-def _phases(modes: int, nodes: int) -> FloatArray:
-    """Return the phase increment of each wave from one node to the next."""
-    return 2 * np.pi * np.arange(1, modes + 1) / nodes
-
-
-def _at_nodes(phase: FloatArray) -> FloatArray:
-    """Return the Fourier transform of 1/6, 4/6, 1/6, the values of the B-spline at the nodes."""
-    return np.asarray((2 + np.cos(phase)) / 3)
 
 
 @jit
