@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy.optimize import OptimizeResult, least_squares
 
 from mdr_dask import bootstrap
 from mdr_dask.aggregation import companion
@@ -160,11 +161,22 @@ def nonlinear(
     """Fit a law to a stack of logarithms, and test the law with the stated and with the fitted constants.
 
     The function `model` takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1,
-    cases). The constants `stated` are exponents or logarithms of factors.
+    cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row; the
+    constants of the other rows follow by linearisation.
     """
-    found = fitted(
-        lambda rows: _least_squares(model, stated, rows), lambda rows, best: rows - model(best), logs, count, stated
-    )
+
+    def misfit(constants: FloatArray) -> FloatArray:
+        residuals: FloatArray = (logs[0] - model(constants[None]))[0]
+        return residuals
+
+    best: OptimizeResult = least_squares(misfit, stated, method="lm")
+    solve = -np.linalg.pinv(best.jac).T
+
+    def fit(rows: FloatArray) -> FloatArray:
+        constants: FloatArray = best.x + (rows - model(np.broadcast_to(best.x, (len(rows), stated.size)))) @ solve
+        return constants
+
+    found = fitted(fit, lambda rows, constants: rows - model(constants), logs, count, stated)
     rest = logs - model(np.broadcast_to(stated, (len(logs), stated.size)))
     excluded = excludes(found.constants[:, 0], count, stated[0])
     sentence = verdict(rest, count, 0, where, excluded=excluded)
@@ -180,33 +192,6 @@ def nonlinear(
 def rms(left: FloatArray) -> float:
     """Return the root mean square of the residuals `left`."""
     return float(np.sqrt(np.mean(left**2)))
-
-
-def _least_squares(model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray) -> FloatArray:
-    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return the constants of each row.
-
-    Each call of the model evaluates all rows, which is a hundred times faster than one scipy fit for each row.
-    """
-    size = np.eye(start.size)
-    constants = np.tile(start, (data.shape[0], 1))
-    damping = np.full(data.shape[0], 1e-6)
-    value = model(constants)
-    cost = np.sum((data - value) ** 2, axis=1)
-    for _ in range(40):
-        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * size], axis=-1)
-        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
-        normal = normal + (damping * np.einsum("sii->s", normal) + 1e-12)[:, None, None] * size
-        gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
-        step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
-        trial = model(constants + step)
-        cost_there = np.sum((data - trial) ** 2, axis=1)
-        better = cost_there <= cost
-        constants = np.where(better[:, None], constants + step, constants)
-        value, cost = np.where(better[:, None], trial, value), np.where(better, cost_there, cost)
-        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e9)
-        if np.abs(step).max() < 1e-9:
-            break
-    return constants
 
 
 # results
