@@ -34,13 +34,12 @@ class Statistic:
 
 def count(array: xr.DataArray) -> xr.DataArray:
     """Return the number of successful realisations."""
-    return array.notnull().sum("realisation")
+    return array.count("realisation")
 
 
 def mean(array: xr.DataArray) -> xr.DataArray:
     """Return the mean of the successful realisations; NaN for a case without a successful realisation."""
-    number = count(array)
-    return array.sum("realisation") / number.where(number > 0)
+    return array.mean("realisation")
 
 
 def standard_deviation(array: xr.DataArray) -> xr.DataArray:
@@ -80,33 +79,13 @@ def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.D
     If the scatter is unknown, for example with one realisation, the interval is the mean plus or minus the
     discretisation error. If this error is unknown too, both ends are NaN.
     """
-    known = (array,) if error is None else xr.broadcast(array, abs(error))
-    found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
-        _mean_and_ends,
-        *(each.compute() for each in known),
-        input_core_dims=[["realisation"]] * len(known),
-        output_core_dims=[[], [], []],
-    )
-    return found
-
-
-def _mean_and_ends(
-    values: NDArray[np.float64], errors: NDArray[np.float64] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    middle, count = _mean(values), values.shape[-1]
-    if errors is None:
-        return middle, *np.moveaxis(_interval(values, count), -1, 0)
-    grid = _mean(errors)
-    low, high = np.moveaxis(_interval(np.concatenate([values, grid[..., None]], axis=-1), count), -1, 0)
-    with np.errstate(invalid="ignore"):  # an infinite mean minus an infinite error is NaN
-        return middle, np.where(np.isnan(low), middle - grid, low), np.where(np.isnan(high), middle + grid, high)
-
-
-def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    known = ~np.isnan(values)
-    number = known.sum(axis=-1)
-    total: NDArray[np.float64] = np.where(known, values, 0.0).sum(axis=-1)
-    return total / np.where(number > 0, number, np.nan)
+    array, error = array.compute(), None if error is None else error.compute()
+    middle, ends = mean(array), interval(array, error)
+    low, high = ends.isel(bound=0, drop=True), ends.isel(bound=1, drop=True)
+    if error is None:
+        return middle, low, high
+    grid = grid_error(error)
+    return middle, low.fillna(middle - grid), high.fillna(middle + grid)
 
 
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:

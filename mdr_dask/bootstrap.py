@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 CONFIDENCE = 0.95
 #: Number of resamples; the ends of an interval are then accurate to about 5 % of its width.
 RESAMPLES = 400
-#: Largest number of groups of neighbouring values. The values of a group are shifted together by their errors.
+#: Largest number of groups into which values are divided. The values of a group are shifted, or left out, together.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)

@@ -27,8 +27,6 @@ CHASED = 0.05
 #: Intervals of this width, as a fraction of the axis, are not halved any further. This limits the number of values that
 #: are spent on a discontinuity.
 FINEST = 2.0**-10
-#: Smallest number of values along an axis from which the output is predicted.
-FEWEST = 3
 #: An interval can pass the test only if one of its ends is a value of this level or a higher level. The values of
 #: level 3 are the eighths of the axis. The outputs at the quarters (level 2) are predicted from only three values, and
 #: such a prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
@@ -282,7 +280,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     missed = np.zeros((2, *now.shape))
     for level in range(1, int(levels.max()) + 1):
         here, before = levels[last] == level, levels < level
-        if here.any() and before.sum() >= FEWEST:
+        if here.any() and before.sum() >= 2:
             for kind, interpolate in enumerate((PchipInterpolator, CubicSpline)):
                 predicted = interpolate(places[before], groups[..., before], axis=-1)(at[:, here])
                 missed[kind][..., here] = predicted - now[..., here]

@@ -15,9 +15,6 @@ from mdr_dask.models.base import Model, Status
 #: Least and largest factor by which a round multiplies the number of realisations. The least factor avoids many rounds.
 #: The largest factor is limited because a few results give only a poor estimate of the scatter.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Factor by which a round multiplies the number of realisations if a fitted constant needs more of them. The required
-#: number cannot be estimated for a fitted constant.
-GROWTH = 1.5
 #: Least number of results with which the estimated standard error alone decides whether a case stops. If cases stopped
 #: earlier, only 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
 FEWEST = 12

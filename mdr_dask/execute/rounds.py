@@ -24,7 +24,7 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.stages import Places, cases_of, following, stored_layout
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Stage
-from mdr_dask.replication import GROWTH, growth_needed, known_scatter, next_round
+from mdr_dask.replication import LEAST_GROWTH, growth_needed, known_scatter, next_round
 from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
 
@@ -271,7 +271,8 @@ def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Roun
     from mdr_dask.execute.answers import cases_that_narrow  # imported late, because it imports the fits
 
     narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
-    return [np.where(cases, np.maximum(each, GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
+    # the number of realisations that a fitted constant requires cannot be estimated
+    return [np.where(cases, np.maximum(each, LEAST_GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
 
 
 def _growth_of(url: str, template: Template, count: int) -> FloatArray:

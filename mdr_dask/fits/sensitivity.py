@@ -21,8 +21,6 @@ from mdr_dask.errors import FitError, distinguishable
 NARROW = 0.1
 #: Smallest number of base points (in Saltelli's design) or cases from which an index is computed.
 FEWEST = 16
-#: Number of groups into which the jackknife divides the base points or cases.
-GROUPS = 20
 
 
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
@@ -169,8 +167,9 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
     `indices` takes outputs of shape (realisations, points, ...).
     """
     middle, lines = indices(values), len(values)
-    group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % GROUPS
-    half = _jackknife([indices(values[:, group != k]) for k in range(GROUPS)])
+    groups = min(bootstrap.GROUPS, values.shape[1])
+    group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % groups
+    half = _jackknife([indices(values[:, group != k]) for k in range(groups)])
     if lines > 1:
         half = np.hypot(half, _jackknife([indices(np.delete(values, k, axis=0)) for k in range(lines)]))
     return np.array([middle, middle - half, middle + half])
