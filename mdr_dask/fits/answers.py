@@ -7,21 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from mdr_dask import bootstrap
 from mdr_dask.campaign import Campaign, Tolerance
 from mdr_dask.errors import CampaignError, FitError, did_you_mean
 from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
-#: Shift of the results of a case, in standard errors, that shows whether a constant depends on the case. It is so small
-#: that the fit still selects the same cases.
+#: Change of the data by which derivatives are computed: a shift of the results of a case, in standard errors, or a
+#: fraction of the scatter. It is so small that the fit still selects the same cases.
 STEP = 1e-3
-#: Largest number of groups into which the values along a dimension are divided. One group is shifted at a time.
-GROUPS = 32
 #: A group of cases needs no more realisations if a shift of its results by one standard error changes the constant by
 #: less than this fraction of the half width of the interval of the constant.
 NEGLIGIBLE = 0.01
-#: To extrapolate to zero scatter, the fit is repeated with the scatter changed by this fraction.
-LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
@@ -80,8 +77,8 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
         found = half_widths(fit, constant, {name: _scattered(data, scale) for name, data in groups.items()})
         return {name: (half - scale * now[name][1]) / (1 - scale) for name, (_, half) in found.items()}
 
-    more = left(1 + LESS)
-    return {name: less.where(less < more[name], more[name]) for name, less in left(1 - LESS).items()}
+    more = left(1 + STEP)
+    return {name: less.where(less < more[name], more[name]) for name, less in left(1 - STEP).items()}
 
 
 def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
@@ -146,7 +143,7 @@ def cases_behind(
         if dim in own:
             continue
         follows = xr.zeros_like(chosen)
-        for group in np.array_split(np.arange(sizes[dim]), min(GROUPS, sizes[dim])):
+        for group in np.array_split(np.arange(sizes[dim]), min(bootstrap.GROUPS, sizes[dim])):
             here = place[dim].isin(group)
             there = after(here)
             if there is not None:

@@ -21,7 +21,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits import top
-from mdr_dask.fits.base import Fit, require, short, verdict
+from mdr_dask.fits.base import WITHIN, Fit, require, short, verdict
 from mdr_dask.fits.cases import (
     Variables,
     constant,
@@ -42,7 +42,6 @@ MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
 # smallest and largest load F_N / (G h L) of the fit in zone 1; other limits change alpha by up to 0.02, beta by 0.14
 ZONE_ONE = (0.01, 0.3)
-LINEAR = 0.05  # two neighbouring velocities are in region I if the values of mu / v differ by less than this fraction
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
@@ -95,6 +94,7 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
 
+    At this velocity and at the next one, the values of mu / v differ by less than the fraction `WITHIN`.
     The index is not always 0: with the time stepping of the original papers, friction does not fall below a spurious
     limit and is therefore too large at very low velocities.
     """
@@ -103,7 +103,7 @@ def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     for k in range(velocity.size - 1):
         both = friction[k : k + 2, np.isfinite(friction[k : k + 2]).all(axis=0)]
         low, high = both.mean(axis=1) / velocity[k : k + 2] if both.size else (np.nan, np.nan)
-        if abs(high / low - 1) < LINEAR:
+        if abs(high / low - 1) < WITHIN:
             return k
     return None
 
@@ -158,7 +158,7 @@ def _plateau(data: xr.Dataset) -> Variables:
     found = top.highest(x, stack, count)
     ends = bootstrap.interval(found.rise, count)
     reached = _reached(x, found, (float(ends[0]), float(ends[1])), form)
-    flat = stack[0] > (1 - top.FLAT) * stack[0].max()
+    flat = stack[0] > (1 - WITHIN) * stack[0].max()
     height = constant("plateau", found.height, count, "largest mu divided by the rms slope of the line")
     if reached.startswith("no:"):
         height |= {f"plateau_{end}": xr.Variable((), np.nan, height["plateau"].attrs) for end in ("low", "high")}
@@ -166,7 +166,7 @@ def _plateau(data: xr.Dataset) -> Variables:
         **height,
         **measure("plateau_stated", math.sqrt(2), "sqrt 2, the plateau by eq. 3.15"),
         **measure(
-            "decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {top.FLAT:.0%} of plateau"
+            "decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {WITHIN:.0%} of plateau"
         ),
         **measure("reached", reached, "whether friction reaches its maximum within the range of velocities"),
         **_root_two(data, found.height, known[flat], count, reached),
@@ -216,9 +216,9 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
         change += f" ({ends[0]:.2g}, {ends[1]:.2g})"
     steepest = max(ends, key=abs) if known else rise
     end = "still rises at the largest velocity" if steepest > 0 else "already falls at the lowest velocity"
-    if abs(rise) > top.FLAT and not (known and ends[0] <= 0 <= ends[1]):
+    if abs(rise) > WITHIN and not (known and ends[0] <= 0 <= ends[1]):
         return f"no: the plateau is not reached, friction {end}, {change}"
-    if abs(rise) > top.FLAT or (known and max(map(abs, ends)) > top.FLAT):
+    if abs(rise) > WITHIN or (known and max(map(abs, ends)) > WITHIN):
         return f"not tested: because of the scatter, it is uncertain whether friction {end}, {change}"
     if x[0] < at < x[-1] and abs(rise) < 1e-9:
         return f"yes: friction is largest at {place.format(np.exp(at))}"

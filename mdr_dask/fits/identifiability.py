@@ -110,8 +110,10 @@ def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row:
         if np.any(plain) and _spread(logarithms @ plain, found.weights) <= ROUNDED * best:
             row = plain
             break
+    else:
+        row = np.round(row, 2)
     exponents = np.zeros(unknowns)
-    exponents[list(free)] = np.round(row, 2)
+    exponents[list(free)] = row
     return Product(exponents, np.exp(logarithms @ exponents[list(free)]))
 
 
@@ -130,9 +132,9 @@ def _power(power: float) -> str:
     if power == 1:
         return ""
     simple = Fraction(power).limit_denominator(3)
-    if abs(simple - power) > 0.006:
+    if float(simple) != power or simple.denominator == 1:
         return f"^{power:g}"
-    return f"^{simple}" if simple.denominator == 1 else f"^({simple})"
+    return f"^({simple})"
 
 
 def unit_of(units: Sequence[str], exponents: FloatArray) -> str:

@@ -17,10 +17,6 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.units import shown_apart
 
-#: `LARGEST`: largest number of values in a table. `PIECES`: largest number of steps into which the interval between
-#: two computed values of an axis is divided.
-LARGEST, PIECES = 2_000_000, 16
-
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
@@ -39,8 +35,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     if not axes:
         raise FitError(f"expected an axis of at least {FEWEST} numbers, got none")
     mean, half = (array.transpose(..., *axes) for array in (mean, half))
-    pieces = int(np.clip((LARGEST / mean.size) ** (1 / len(axes)), 1, PIECES))
-    grids = {axis: dense(mean[axis].to_numpy(), pieces) for axis in axes}
+    grids = dict(zip(axes, dense([mean[axis].to_numpy() for axis in axes], mean.size), strict=True))
     places = {k - len(axes): mean[axis].to_numpy() for k, axis in enumerate(axes)}
     table = scale.of_values(mean.to_numpy())
     error = half.to_numpy() + sum(left_out_error(scale, table, place, k) for k, place in places.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,9 @@ FEWEST = 4
 #: Error of interpolation with all values, divided by the error with every second value only. The ratio is 1/4 for an
 #: error of second order; at a kink it would be 1/2.
 LEFT = 0.25
+#: `LARGEST`: largest number of values in a dense table. `PIECES`: largest number of steps into which the interval
+#: between two computed values of an axis is divided.
+LARGEST, PIECES = 2_000_000, 16
 
 
 class Scale:
@@ -45,11 +49,17 @@ class Scale:
         return np.exp(values) if self.logarithmic else values
 
 
-def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Divide each interval between neighbouring values of an axis into equal steps; return all given and new values.
+def dense(axes: Sequence[FloatArray], size: int) -> list[FloatArray]:
+    """Divide each interval between neighbouring values of all axes into equal steps; return the given and new values.
 
-    The steps are equal on the scale that `Scale.of` chooses for the given values `places`.
+    The steps are equal on the scale that `Scale.of` chooses for an axis. `size` is the number of values in the table of
+    computed values.
     """
+    pieces = int(np.clip((LARGEST / size) ** (1 / len(axes)), 1, PIECES))
+    return [_divided(places, pieces) for places in axes]
+
+
+def _divided(places: FloatArray, pieces: int) -> FloatArray:
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))

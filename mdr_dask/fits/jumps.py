@@ -37,7 +37,6 @@ from mdr_dask.fits.cases import (
 
 MODELS = ("velocity_jump",)
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
-LEAST = 2  # a case needs at least this number of successful realisations
 
 LAW = 0.4  # the constant c of eq. 4.11, as stated in the thesis
 # a case with mu_1 / s below this value is in region I; there, eqs. 4.9 and 4.11 differ by less than 3 %
@@ -68,8 +67,8 @@ def each_jump(
 ) -> xr.Dataset:
     """Check that a series has jumps of the velocity; then fit a law as `mdr_dask.fits.cases.each` does."""
     (data,) = series.values()
-    if "realisation" in data.sizes and data.sizes["realisation"] < LEAST:
-        raise FitError(f"expected at least {LEAST} realisations, got {data.sizes['realisation']}")
+    if "realisation" in data.sizes and data.sizes["realisation"] < 2:
+        raise FitError(f"expected at least two realisations, got {data.sizes['realisation']}")
     if not is_jump(data):
         raise FitError("expected a jump of the velocity, got another loading history")
     return each(series, inner, fit, *LEVELS, "rms_slope", *outputs)

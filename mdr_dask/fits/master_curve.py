@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,8 +27,6 @@ from mdr_dask.fits.curve_tables import (
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
 from mdr_dask.physics.superposition.master_curve import EXPANSION, OFFSET, Superposition, Vertical
-
-SHARE_OF_BARS = 0.6827  # probability of the interval whose half width is ``_error``
 
 
 def master_curve(
@@ -186,7 +185,7 @@ def _dataset(
     }
     attrs |= {f"{name}_noise": float(each) for name, each in zip(("ordinate", "companion"), result.noise, strict=False)}
     found: dict[str, tuple[Any, ...]] = {}
-    narrow, wide = result.interval(SHARE_OF_BARS), result.interval()
+    narrow, wide = result.interval(math.erf(0.5**0.5)), result.interval()  # as wide as two standard errors; 95 %
     for name, factor, own in (
         ("shift_factor", result.horizontal, slice(size)),
         ("vertical_factor", result.vertical, slice(size, None)),

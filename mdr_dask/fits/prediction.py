@@ -20,11 +20,6 @@ from mdr_dask.units import shown_apart
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-#: Largest number of unknowns.
-MOST = 4
-#: `LARGEST`: largest number of values in the dense table of means. `PIECES`: largest number of steps into which the
-#: interval between two computed values of an unknown is divided.
-LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
 #: All cases use the same rough lines, so that a few modes represent the scatter of all cases. `MODES`: largest number
@@ -144,9 +139,9 @@ def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
                 f"expected at least {FEWEST} values of the unknown {name}, got {dataset.sizes[name]}; add values to "
                 f"the campaign, or a column {name} to the table if it was measured"
             )
-    if not 1 <= len(free) <= MOST:
+    if not 1 <= len(free) <= 4:
         found = ", ".join(free) or "none"
-        raise FitError(f"expected one to {MOST} axes of the study that are not columns of the table, got {found}")
+        raise FitError(f"expected one to four axes of the study that are not columns of the table, got {found}")
     return {name: dataset[name].to_numpy().astype(np.float64) for name in free}
 
 
@@ -196,11 +191,9 @@ def _fields(
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
     """Mark the missing cases and their neighbours, because a cubic uses two cases on each side of a point."""
-    along = np.moveaxis(absent, axis, 0).copy()
-    before = along.copy()
-    along[1:] |= before[:-1]
-    along[:-1] |= before[1:]
-    return np.moveaxis(along, 0, axis)
+    from scipy.ndimage import maximum_filter1d
+
+    return np.asarray(maximum_filter1d(absent.astype(np.int8), 3, axis) > 0)
 
 
 def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
@@ -263,10 +256,8 @@ def _interpolators(
     places = [scale.of_values(values) for scale, values in zip(scales, unknowns.values(), strict=True)]
     unit = [(place - place[0]) / (place[-1] - place[0]) for place in places]
     table, errors = at_points[..., 0], at_points[..., 2:]
-    pieces = int(np.clip((LARGEST / table.size) ** (1 / len(unit)), 1, PIECES))
     fine = []
-    for k, values in enumerate(unknowns.values()):
-        grid = dense(values, pieces)
+    for k, (values, grid) in enumerate(zip(unknowns.values(), dense([*unknowns.values()], table.size), strict=True)):
         table = cubic(values, table, grid, k)
         fine.append((scales[k].of_values(grid) - places[k][0]) / (places[k][-1] - places[k][0]))
         fine[-1][[0, -1]] = 0.0, 1.0

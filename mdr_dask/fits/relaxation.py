@@ -30,7 +30,7 @@ from mdr_dask.fits.cases import (
     rms,
     table_of,
 )
-from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of
+from mdr_dask.fits.jumps import LAW, LEVELS, MODELS, each_jump, jump_law, jumps_of
 
 WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
 FLOOR = 0.01  # assumed grid error of mu - mu_2, as a fraction of the largest mu - mu_2 (docs/kinetics.md)
@@ -166,7 +166,7 @@ def _fit_case(case: xr.Dataset) -> Relaxation | None:
         np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(of_after), 0.0, of_after), 0.0)
     )
     good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
-    if len(good) < LEAST or not np.abs(good.mean(axis=0)).max() > INSTANT * jumps_of(case).slope[0]:
+    if len(good) < 2 or not np.abs(good.mean(axis=0)).max() > INSTANT * jumps_of(case).slope[0]:
         return None
     means = bootstrap.means(bootstrap.complete(relaxing))
     traces = np.concatenate([means, bootstrap.moved(means[0], np.append(error[1], trace_error))])
@@ -180,7 +180,7 @@ def _closed_law(case: xr.Dataset, rate: float) -> Variables:
     means = bootstrap.means(bootstrap.complete(values))
     rms_error = np.nan
     sentence = "not tested: fewer than two realisations succeeded, or their friction does not jump"
-    if np.all(np.isfinite(values), axis=1).sum() >= LEAST and means[0, 1] != 0:
+    if np.all(np.isfinite(values), axis=1).sum() >= 2 and means[0, 1] != 0:
         jumps = jumps_of(case)
         stack = np.concatenate([means, bootstrap.moved(means[0], error)])
         before, jump, after = stack[:, :3].T

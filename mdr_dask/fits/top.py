@@ -13,7 +13,6 @@ from mdr_dask.fits.base import DOUBTFUL
 #: A parabola is fitted to the points that are below the maximum by at most a fraction: the first of these fractions
 #: for which scatter and errors explain the residuals.
 TOPS = (0.3, 0.2, 0.1, 0.05)
-FLAT = 0.05  # points that are below the maximum by at most this fraction belong to the plateau
 
 
 def smoothed(mean: FloatArray) -> FloatArray:

@@ -171,7 +171,7 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
         (RIG.replace("1, 0.1,", "1, 30,"), {}, r"rig.csv:3: velocity is 30 m/s, but this study has 1 mm/s to 1 m/s"),
         (RIG, {"relaxation_time": slice(3)}, "expected at least 4 values of the unknown relaxation_time, got 3"),
         (RIG, {"velocity": slice(3)}, "but this study has"),
-        (RIG, {"relaxation_time": 0, "rms_roughness": 0}, "expected one to 4 axes of the study .*, got none"),
+        (RIG, {"relaxation_time": 0, "rms_roughness": 0}, "expected one to four axes of the study .*, got none"),
         (RIG.replace(", standard_error", "").replace(", 0.001", ""), {}, "expected more than 2 measured points for 2"),
     ],
 )

@@ -17,8 +17,6 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.physics.solids import GAS_CONSTANT
 
-CONFIDENCE = 0.95
-
 STRAIGHTEST = 1e-5
 """Ratio of the range of temperature to c2 below which factors count as linear in temperature."""
 
@@ -47,9 +45,10 @@ class ShiftLaw:
 
 
 def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, anchor: int) -> ShiftLaw:
-    """Fit ``factor = exponent log10(group / anchor)``; `anchor` is the index of the group whose factor is zero."""
-    if np.any(groups <= 0):
-        raise FitError("a power law needs positive groups, such as velocities")
+    """Fit ``factor = exponent log10(group / anchor)``; `anchor` is the index of the group whose factor is zero.
+
+    The groups must be positive.
+    """
     return _one_constant("power", "exponent", lambda at: np.log10(at / groups[anchor]), groups, factors, covariance)
 
 
@@ -170,7 +169,7 @@ def _fit(
     if squares > freedom and excess(smallest) > 0 > excess(largest):
         found = solved(float(np.exp(brentq(excess, smallest, largest, xtol=1e-3))))
     spread = np.asarray(np.linalg.pinv(found.jac.T @ found.jac), dtype=np.float64)
-    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
+    quantile = float(stdtrit(freedom, 0.975))
     best = np.asarray(found.x, dtype=np.float64)
     fitted = ShiftLaw(name, {}, partial(law, best), factors - law(best, groups), float(chdtrc(freedom, squares)))
     return fitted, best, spread, quantile

@@ -15,8 +15,7 @@ from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.physics.superposition.posterior import STEP_SCATTER, Curves, solve
 from mdr_dask.physics.superposition.sampling import draws
 
-CURVE_POINTS = 201
-CONFIDENCE = 0.95
+CURVE_POINTS = 201  # of the merged curve
 
 EXPANSION = 6e-4
 """Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
@@ -104,7 +103,7 @@ class Superposition:
         """Standard errors of the vertical factors in decades."""
         return np.asarray(self.draws[:, self.groups.size :].std(axis=0), dtype=np.float64)
 
-    def interval(self, confidence: float = CONFIDENCE) -> FloatArray:
+    def interval(self, confidence: float = 0.95) -> FloatArray:
         """Return the ends of the confidence intervals of all factors, shape (2, 2 groups)."""
         ends = (0.5 - confidence / 2, 0.5 + confidence / 2)
         return np.asarray(np.quantile(self.draws, ends, axis=0), dtype=np.float64)

@@ -122,14 +122,8 @@ class Curves:
         return np.concatenate(means), block_diag(step_precision(self.count), *[bends] * channels, widths)
 
 
-def _pieces() -> tuple[BSpline, BSpline]:
-    """Return the four cubic B-splines that overlap on a cell of width 1, and their derivatives."""
-    knots = np.arange(-3.0, 5.0)
-    pieces = BSpline(knots, np.eye(4), 3)
-    return pieces, pieces.derivative()
-
-
-_VALUES, _SLOPES = _pieces()
+_VALUES = BSpline(np.arange(-3.0, 5.0), np.eye(4), 3)  # the four cubic B-splines that overlap on a cell of width 1
+_SLOPES = _VALUES.derivative()
 
 
 @dataclass(frozen=True)
