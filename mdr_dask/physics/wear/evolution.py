@@ -23,24 +23,10 @@ from mdr_dask.physics.outcome import Outcome
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
-MOST_STEPS = 20000
-"""Number of steps after which a march fails."""
-MOST_ITERATIONS = 12
-"""Number of Newton iterations after which a step fails; a step that is short enough needs about three."""
-GROWTH = 1.8
-"""Largest ratio of a step to the previous step; formulas of order 3 need a bound to be stable."""
-SLOW = 0.4
-"""Ratio of successive Newton corrections above which the Jacobian is renewed."""
-DIFFERENCE = 1e-7
-"""Step of the finite differences for the unknowns that follow the image; about the root of the rounding error."""
-SHORTEST = 1e-4
-"""A march fails if a step is shorter than this fraction of the longest step so far, or of the first step if that is
-shorter.
-"""
-NEWTON, ROUNDING = 1e-5, 1e-9
-"""Tolerance of Newton's method: `NEWTON` times the step tolerance, because a moving border amplifies the error, but at
-least `ROUNDING`.
-"""
+MOST_STEPS = 20000  # a march with more steps fails: limit of computing time
+MOST_ITERATIONS = 12  # Newton iterations of one step; a step that is short enough needs about three
+GROWTH = 1.8  # largest ratio of a step to the previous step: zero-stability of BDF 3 (Calvo et al. 1990)
+TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # of Newton's method, and step of its finite differences
 
 
 class NotConvergedError(ArithmeticError):
@@ -71,8 +57,8 @@ class Problem(Protocol):
     def holds(self, unknowns: FloatArray) -> bool:
         """Return whether the unknowns describe a possible geometry, for example a contact of positive width."""
 
-    def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return whether a solution of the equations is physically possible, within a tolerance."""
+    def admits(self, unknowns: FloatArray) -> bool:
+        """Return whether a solution of the equations is physically possible, within `TOLERANCE`."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
@@ -107,24 +93,20 @@ def march(
     `Problem.worn` that is allowed in one step, and `first` is the length of the first step. The steps do not depend on
     `end`.
     """
-    newton = _Newton(problem, tolerance)
+    newton = _Newton(problem)
     history = [settled(problem) if start is None else start]
-    step, longest = first, 0.0
+    step = first
     while history[-1].time < end and not stops(history[-1]):
+        time = history[-1].time
         if len(history) > MOST_STEPS:
             raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {MOST_STEPS}")
-        time = history[-1].time
-        if time + step == time or step < SHORTEST * min(longest, first):
+        if time + step == time:
             raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
-        power = 1.0 / (min(len(history), 3) + 1)
-        if moment is None or error > tolerance:
-            step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
-            continue
-        history.append(moment)
-        longest = max(longest, step)
-        growth = min(GROWTH, 0.85 * (tolerance / max(error, 1e-300)) ** power)
-        step *= growth if growth > 1.1 or growth < 0.9 else 1.0
+        change = 0.8 * (tolerance / max(error, 1e-300)) ** (1.0 / (min(len(history), 3) + 1))
+        if moment is not None and error <= tolerance:
+            history.append(moment)
+        step *= min(max(change, 0.2), GROWTH)
     return history
 
 
@@ -132,31 +114,22 @@ def settled(problem: Problem) -> Any:
     """Return the virgin contact as a solution of the discrete equations, so that the first step has no jump."""
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
-    unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
+    unknowns = _Newton(problem).solve(virgin.unknowns, 0.0, known)
     return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
 
 
-def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
+def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]:
     """Return the number of moments in the history that are earlier than `time`, and the moment at this time.
 
-    If the history contains no moment at this time, it is computed by one or more additional steps.
+    If the history contains no moment at this time, it is computed by an additional step.
     """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
-    if time < np.finfo(np.float64).tiny:  # 1 / time would overflow
-        return 0, history[0]
-    newton, past, next_time = _Newton(problem, tolerance), list(history[:before]), time
-    while past[-1].time < time:
-        moment, _ = _try_step(problem, newton, past, next_time)
-        if moment is not None:
-            past.append(moment)
-            next_time = time
-        elif next_time - past[-1].time > SHORTEST * (time - past[-1].time):
-            next_time = past[-1].time + 0.25 * (next_time - past[-1].time)
-        else:
-            raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
-    return before, past[-1]
+    moment, _ = _try_step(problem, _Newton(problem), history[:before], time)
+    if moment is None:
+        raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
+    return before, moment
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
@@ -187,7 +160,7 @@ def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time
     unknowns = newton.solve(guess, theta, known)
     if unknowns is None:
         unknowns = newton.solve(past[0].unknowns, theta, known)
-    if unknowns is None or not problem.admits(unknowns, newton.enough):
+    if unknowns is None or not problem.admits(unknowns):
         return None, np.inf
     gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)))
     return problem.moment(time, unknowns, theta, known(unknowns), past), float(gap) * _ERROR_SHARE[order - 1]
@@ -196,32 +169,29 @@ def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time
 class _Newton:
     """Newton's method with a Jacobian that is reused from step to step while the iteration converges."""
 
-    def __init__(self, problem: Problem, tolerance: float) -> None:
-        self.problem, self.enough = problem, max(NEWTON * tolerance, ROUNDING)
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
         self.factors: Factors | None = None
 
     def solve(self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
         """Return the unknowns of one step, or None if the iteration fails."""
         if self.factors is not None:
-            found = self._iterate(guess, theta, known, fresh=False)
+            found = self._iterate(guess, theta, known)
             if found is not None:
                 return found
-        return self._iterate(guess, theta, known, fresh=True)
+        self.factors = None
+        return self._iterate(guess, theta, known)
 
     def _iterate(
-        self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], *, fresh: bool
+        self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
     ) -> FloatArray | None:
-        """Return the solution, or None if the iteration fails.
-
-        If convergence is slow and `fresh` is True, the Jacobian is renewed. If convergence is slow and `fresh` is
-        False, the iteration fails.
-        """
-        unknowns, last, renew = guess.copy(), np.inf, fresh
+        """Return the solution, or None if the iteration fails or a reused Jacobian makes it slow."""
+        is_reused, last = self.factors is not None, np.inf
         for _ in range(MOST_ITERATIONS):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
             if not np.isfinite(residual).all():
                 return None
-            if renew:
+            if self.factors is None:
                 self._renew(unknowns, theta, known, residual)
             if self.factors is None:
                 return None
@@ -231,12 +201,14 @@ class _Newton:
             if not (np.isfinite(size) and self.problem.holds(unknowns)):
                 return None
             rate = size / last
-            left = size * rate / (1.0 - rate) if 0.0 < rate < 0.5 else size
-            if left < self.enough:
+            # the sum of all further changes, if the ratio of successive changes stays the same
+            left = size * rate / (1.0 - rate) if 0.0 < rate <= 0.5 else size
+            if left < TOLERANCE:
                 return unknowns
-            renew = rate > SLOW
-            if renew and not fresh:
-                return None
+            if rate > 0.5:
+                if is_reused:
+                    return None
+                self.factors = None
             last = size
         return None
 
@@ -247,9 +219,9 @@ class _Newton:
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
-            moved[column] += DIFFERENCE
+            moved[column] += TOLERANCE
             shifted = self.problem.residual(moved, theta, known(moved))
-            matrix[:, column] = (shifted - residual) / DIFFERENCE
+            matrix[:, column] = (shifted - residual) / TOLERANCE
         self.factors = factorise(matrix)
 
 

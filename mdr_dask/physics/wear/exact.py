@@ -77,14 +77,6 @@ class Resolution(NamedTuple):
         """The error allowed in a step."""
         return 0.2 * self.accuracy * ROUGHER**self.rougher
 
-    @property
-    def first(self) -> float:
-        """The length of the first step, as a fraction of the time scale of the contact.
-
-        It is limited, so that the relative error remains below 2 % even after little wear.
-        """
-        return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
-
     def panels(self, near: int) -> Panels:
         """Return the panels for partial slip, which are halved `near` more times towards the stick border."""
         digits = -np.log10(self.accuracy)
@@ -181,7 +173,6 @@ class _Leg(NamedTuple):
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
-    tolerance: float
     before: float = 0.0
 
     @property
@@ -194,7 +185,7 @@ class _Leg(NamedTuple):
 
         They are the dissipated energy divided by mu, and a lower limit for the stated error of the contact radius.
         """
-        number, moment = at(self.problem, self.moments, time, self.tolerance)
+        number, moment = at(self.problem, self.moments, time)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
         first, last = (self.problem.edge(self.moments[k].unknowns) for k in (max(number - 1, 0), number))
@@ -216,7 +207,7 @@ def _fretted(
         return dict.fromkeys(late, limit(profile, c))
     panels = resolution.panels(round(-2.0 * np.log2(max(c, 0.1))) + 5 if constant_force else round(-2.0 * np.log2(c)))
     problem = partial_slip(profile, c, panels, reach)
-    first = resolution.first * float(np.sqrt(problem.body.width))
+    first = resolution.step * float(np.sqrt(problem.body.width))
 
     def stops(moment: SlipMoment) -> bool:
         if problem.edge(moment.unknowns) > profile.largest_radius:
@@ -227,12 +218,12 @@ def _fretted(
     if constant_force:
         problem, start = problem.under_force()
         moments = march(problem, np.inf if late else early[-1], resolution.step, first, start, stops)
-        legs.append(_Leg(problem, moments, resolution.step))
+        legs.append(_Leg(problem, moments))
         energy = legs[0].at(moments[-1].time)[1]
         problem, start = problem.stop(moments[-1])
     if early and not (legs and legs[0].end >= early[-1]):
         moments = march(problem, early[-1], resolution.step, first, start, stops)
-        legs.append(_Leg(problem, moments, resolution.step, energy))
+        legs.append(_Leg(problem, moments, energy))
     contacts = {}
     for time in early:
         leg = legs[0] if time <= legs[0].end else legs[-1]
@@ -390,7 +381,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
     if constant_force:
         problem = replace(problem, force=problem.wear_rate(problem.start().unknowns))
-    leg = _Leg(problem, march(problem, wanted[-1], resolution.step, resolution.first), resolution.step)
+    leg = _Leg(problem, march(problem, wanted[-1], resolution.step, resolution.step))
     return {path: _slid_contact(leg, path) for path in wanted}
 
 

@@ -20,7 +20,7 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import Moment, settled
+from mdr_dask.physics.wear.evolution import TOLERANCE, Moment, settled
 
 #: Weight of the stick border in the error of a step, relative to the weight of the depth. The weight of the border is
 #: large, because f rises like a square root beyond the border.
@@ -145,10 +145,10 @@ class PartialSlip:
         place = self.place(unknowns)
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
-    def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
+    def admits(self, unknowns: FloatArray) -> bool:
         """Return whether y >= 0 in the slip zone (if the border moves), or s >= 0 (if the border does not move)."""
         positive = unknowns[: self.size - 1] if self.border is None else self.slip(unknowns)
-        return bool(np.min(positive) >= -tolerance)
+        return bool(np.min(positive) >= -TOLERANCE)
 
     def radius(self, place: float) -> float:
         """Return the radius that belongs to a value of q."""
@@ -454,7 +454,7 @@ class GrossSlip:
         """Return whether the squared contact radius is positive."""
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
-    def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
+    def admits(self, unknowns: FloatArray) -> bool:
         """Return True, because all known solutions of the equations are possible contacts."""
         return True
 
