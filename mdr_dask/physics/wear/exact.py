@@ -46,10 +46,6 @@ falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is then below the
 """
 JUMP = 0.1
 """If y = 1 - (d - g) / eta exceeds this value in the panel next to the border, the border no longer moves."""
-FLAT = 1e-2
-"""The path of the border is computed only after (d - 1) / eta has reached this fraction of the allowed error of a step,
-because the border of a steep body moves far during the first moments of wear.
-"""
 ROUGHER = 4.0
 """Ratio of the step tolerance of each coarser solution to that of the previous solution."""
 EDGE = 0.2
@@ -58,8 +54,6 @@ error: a position that the edge passes within a step begins to wear only at the 
 """
 NEAR_AXIS = 1e-5
 """Radius, in units of a0, at which the exponent of a body at its tip is evaluated."""
-SHARPEST = 8.0
-"""Largest factor that multiplies the number of halvings of the panels at the tip of a sharp body in gross slip."""
 
 
 class Resolution(NamedTuple):
@@ -196,7 +190,7 @@ def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
     """Return the contact after each wanted number of cycles; all are taken from the same solution."""
-    c = max(_moved(profile, stick_radius, FLAT * resolution.step), stick_radius) if constant_force else stick_radius
+    c = max(_moved(profile, stick_radius, resolution.step), stick_radius) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
         reach = farthest_contact(profile, c) if constant_force else 1.05 * limit_radius(profile, c)
@@ -229,7 +223,7 @@ def _fretted(
         leg = legs[0] if time <= legs[0].end else legs[-1]
         contacts[time] = _contact(leg, time)
         rise = (contacts[time].depth - 1.0) / problem.eta
-        if constant_force and rise < FLAT * resolution.step:
+        if constant_force and rise < resolution.step:
             border = max(_moved(profile, stick_radius, rise), stick_radius)
             least_errors = {**contacts[time].least_errors, "stick_border": border - stick_radius}
             contacts[time] = replace(contacts[time], stick_border=border, least_errors=least_errors)
@@ -377,7 +371,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     Near the axis, f ~ r^n = (r^2)^(n/2), so a body with n < 2 needs smaller panels there.
     """
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
-    sharpness = float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
+    sharpness = max(2.0 / float(np.log2(far / near)), 1.0) if near > 0.0 else 1.0
     problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
     if constant_force:
         problem = replace(problem, force=problem.wear_rate(problem.start().unknowns))

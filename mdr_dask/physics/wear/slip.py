@@ -25,13 +25,6 @@ from mdr_dask.physics.wear.evolution import TOLERANCE, Moment, settled
 #: Weight of the stick border in the error of a step, relative to the weight of the depth. The weight of the border is
 #: large, because f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
-#: Position on the panels up to which `SlipMoment.moved` is stored; the stick border is at 0, and the contact edge at 1.
-BEYOND = 1.25
-#: Lower limit of q, so that its logarithm is finite.
-SMALLEST = 1e-30
-#: `_piece` uses a series if the values of sqrt(r^2 - b^2) at both ends of the piece differ by less than this fraction
-#: of their sum.
-SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
 
@@ -86,8 +79,7 @@ class SlipMoment(Moment):
     """A contact in partial slip at one time.
 
     `path`, shape (2, k), holds the stick border and the depth at the moments at which the border moved; both vary
-    linearly in between. `moved` is the rise of f_star along the path (see `PartialSlip`), at the nodes and in one more
-    panel beyond the edge.
+    linearly in between. `moved` is the rise of f_star along the path (see `PartialSlip`) at the nodes.
     """
 
     path: FloatArray
@@ -123,11 +115,6 @@ class PartialSlip:
     def size(self) -> int:
         """The number of nodes."""
         return self.panels.nodes.size
-
-    @cached_property
-    def mesh(self) -> Mesh:
-        """The panels between border and edge, and one more panel beyond the edge."""
-        return self.panels.mesh.extended(BEYOND)
 
     def image(self, unknowns: FloatArray) -> FloatArray:
         """Return y at all nodes."""
@@ -165,7 +152,7 @@ class PartialSlip:
         square = self.body.width * self.panels.nodes
         gap = square / (np.sqrt(c * c + square) + c)
         y[:-1] = self.profile.rise(gap, c)[:-1] / self.eta
-        return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.mesh.nodes.size))
+        return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.panels.nodes.size))
 
     def under_force(self) -> tuple[PartialSlip, SlipMoment]:
         """Return this problem with constant force instead of constant depth, and the first moment of that problem."""
@@ -203,7 +190,7 @@ class PartialSlip:
             past[0].path,
             self.carried(past[0].path),
         )
-        return lambda unknowns: _known(self.mesh, self.body, earlier, self.place(unknowns))
+        return lambda unknowns: _known(self.panels.mesh, self.body, earlier, self.place(unknowns))
 
     def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
         """Return the worn depth at values of q that the border has passed."""
@@ -310,7 +297,7 @@ class PartialSlip:
         path = past[0].path
         if self.border is None:
             path = np.append(path, [[place.border], [place.depth]], axis=1)
-        moved = _plateau_rise(self.body, path, place.border + place.width * self.mesh.nodes)
+        moved = _plateau_rise(self.body, path, place.border + place.width * self.panels.nodes)
         return SlipMoment(time, unknowns, worn, path, moved)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
@@ -364,7 +351,7 @@ def _known(mesh: Mesh, body: VirginBody, past: Past, place: Place) -> FloatArray
                     value = past.frozen + math.sqrt(z) * value
                 worn += past.shares[k] * value
         z = (q - past.borders[0]) / past.widths[0]
-        rise = value_at(mesh, past.moved, z) if z < mesh.edges[-1] else _rise(body, path, q)
+        rise = value_at(mesh, past.moved, z) if z < 1.0 else _rise(body, path, q)
         rise += _piece(body, border, place.border, place.depth - depth, q)
         result[i] = virgin - rise + worn
         result[nodes + i] = worn
@@ -378,7 +365,7 @@ def _known(mesh: Mesh, body: VirginBody, past: Past, place: Place) -> FloatArray
 @jit_inline
 def _slip_at(body: VirginBody, q: float) -> float:
     """Return the virgin slip s0 at q."""
-    place = math.log(max(q, SMALLEST)) - body.first
+    place = math.log(max(q, 1e-30)) - body.first
     cell = min(max(int(place / body.step), 0), body.coefficients.shape[1] - 1)
     local, k = place - cell * body.step, body.coefficients
     return math.exp(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
@@ -422,10 +409,6 @@ def _piece(body: VirginBody, first: float, last: float, change: float, q: float)
         change *= (q - low) / (high - low)
     scale = math.sqrt(body.width / (body.square + body.width * q))
     begin, end = math.sqrt(max(q - first, 0.0)), math.sqrt(max(q - last, 0.0))
-    whole = begin + end
-    spread = (begin - end) / whole
-    if abs(spread) < SHORT:
-        return 2.0 / math.pi * change * math.asin(min(0.5 * scale * whole, 1.0)) * (1.0 + spread * spread / 3.0)
     mean, weights = 0.0, 0.0
     for node in range(_ABSCISSA.size):
         root = begin + (end - begin) * _ABSCISSA[node]
