@@ -23,8 +23,7 @@ from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 #: window is counted. ``whole``: the whole cluster is tested and counted. ``inside``: such a cluster is ignored.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-#: A spacing is divided into this number of parts. Lengths in contact are counted in whole parts.
-PARTS = 64
+PARTS = 64  # of a spacing: lengths in contact are counted in whole parts
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:

@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import FloatArray
 
 
+STEEL = 210e9 / (2 * (1 - 0.3**2))  # contact modulus of steel on steel in Pa: E = 210 GPa and nu = 0.3 for both
+
+
 class HertzLine(NamedTuple):
     """Half width (m) and maximum pressure (Pa) of a dry line contact."""
 
@@ -73,23 +76,17 @@ def fluid_friction(
     logarithm = log_viscosity(film_share * contact.pressure * cosine) + np.log(
         abs(sliding_velocity) / (film * eyring_stress)
     )
-    # for large l, asinh(e^l) = l + ln 2; this avoids an overflow of e^l
-    stress = eyring_stress * np.where(
-        logarithm > 30, logarithm + np.log(2), np.arcsinh(np.exp(np.minimum(logarithm, 30)))
-    )
+    # asinh(e^l) without an overflow of e^l
+    stress = eyring_stress * np.logaddexp(logarithm, np.logaddexp(2 * logarithm, 0) / 2)
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
-
-
-#: If the film divided by the radius exceeds this ratio, a roller differs from a parabola by more than a few per cent.
-THICKEST_FILM = 0.1
 
 
 def thick_film(film: float) -> str:
     """Return a message if a film h/R is too thick for lubrication theory, otherwise an empty string."""
-    if not film > THICKEST_FILM:
+    if not film > 0.1:  # a roller then differs from a parabola by more than a few per cent
         return ""
     return (
-        f"the film is thicker than {THICKEST_FILM} of the radius: the rollers cannot be approximated by parabolas, and "
+        "the film is thicker than 0.1 of the radius: the rollers cannot be approximated by parabolas, and "
         "Reynolds' equation does not hold"
     )
 
@@ -206,13 +203,9 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
 #: Names of the regimes, in the order of the rows of `limiting_films`.
 REGIMES = ("rigid isoviscous", "rigid piezoviscous", "elastic isoviscous", "elastic piezoviscous")
 
-#: The number ``(h_min/R) W/U`` for a rigid parabola and an isoviscous liquid with the Reynolds exit condition
-#: (Kapitza).
-RIGID_ISOVISCOUS = 4.894968
-#: The number ``(h_min/R) (G U)^(-2/3)`` at which the maximum isoviscous pressure reaches ``1/alpha`` (Blok).
-RIGID_PIEZOVISCOUS = 1.666297
-#: The number ``(h_min/R) M^(1/5) (2 U)^(-1/2)`` for soft bodies and an isoviscous liquid (Moes).
-ELASTIC_ISOVISCOUS = 2.05
+RIGID_ISOVISCOUS = 4.894968  # (h_min/R) W/U of a rigid parabola with the Reynolds exit condition (Kapitza)
+RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) if the isoviscous pressure reaches 1/alpha (Blok)
+ELASTIC_ISOVISCOUS = 2.05  # (h_min/R) M^(1/5) (2 U)^(-1/2) of soft bodies (Moes)
 
 
 def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:

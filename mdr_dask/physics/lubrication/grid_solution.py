@@ -14,13 +14,7 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.deformation import film as film_at
 from mdr_dask.physics.lubrication.grids import adapted_density
 
-#: A second pressure maximum is a spike if it exceeds the pressure minimum between the two maxima by this fraction of
-#: the maximum pressure.
-_SPIKE = 0.01
-#: The interpolating polynomial at a position passes through this number of nodes on each side of the position.
-_CUBIC, _QUINTIC = 2, 3
-#: If the film ends at a node, the computed pressure ends too far upstream by this fraction of a cell.
-_TOO_EARLY = 0.035
+_SPIKE = 0.01  # least height of a pressure spike above the minimum before it, divided by the maximum pressure
 
 
 @dataclass(frozen=True)
@@ -40,7 +34,7 @@ class GridSolution:
 
     def film_between(self, positions: FloatArray) -> FloatArray:
         """Return the film in units of ``a^2/R`` at positions in half widths; NaN upstream of the first node."""
-        film = _between(self.nodes, self.film, positions, _CUBIC)
+        film = _between(self.nodes, self.film, positions, 2)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
         return np.where(positions < self.nodes[0], np.nan, film)
@@ -48,7 +42,7 @@ class GridSolution:
     def pressure_between(self, positions: FloatArray) -> FloatArray:
         """Return the pressure in units of p0 at positions in half widths; zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
-        return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
+        return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, 2), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
         """Return the pressure at other nodes, shifted so that its steep front moves from `self.front` to `front`.
@@ -72,7 +66,7 @@ class GridSolution:
     @cached_property
     def central_film(self) -> float:
         """Film at ``X = 0`` in units of ``a^2/R``, interpolated between nodes."""
-        return float(_between(self.nodes, self.film, np.zeros(1), _CUBIC)[0])
+        return float(_between(self.nodes, self.film, np.zeros(1), 2)[0])
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
@@ -83,7 +77,7 @@ class GridSolution:
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         low, high = float(self.nodes[i - 1]), float(self.nodes[i + 1])
         found = minimize_scalar(
-            lambda x: _between(self.nodes, self.film, np.array([x]), _QUINTIC)[0],
+            lambda x: _between(self.nodes, self.film, np.array([x]), 3)[0],
             bounds=(low, high),
             options={"xatol": 1e-6 * (high - low)},
         )
@@ -142,7 +136,7 @@ class GridSolution:
         if not (root.size == 4 and np.all(np.diff(root) < 0)):
             return float(behind)
         cell = behind - self.nodes[last]
-        end = _between(root[::-1].copy(), x[::-1].copy(), np.zeros(1), _CUBIC)[0] + _TOO_EARLY * cell
+        end = _between(root[::-1].copy(), x[::-1].copy(), np.zeros(1), 2)[0]
         return float(np.clip(end, x[2], behind + cell))
 
 

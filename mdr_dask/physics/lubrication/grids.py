@@ -10,8 +10,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: A fully flooded film begins this many times ``sqrt(2 Hc)`` upstream of ``X = -1``; Hc is the central film.
-FLOODED = 300.0
+FLOODED = 300.0  # distance of a flooded inlet from X = -1 over sqrt(2 Hc), Hc central film: 2e-5 of the film is lost
 
 
 def inlet_position(central_film: float) -> float:

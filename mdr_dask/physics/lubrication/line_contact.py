@@ -24,16 +24,9 @@ from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, R
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
 
-#: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
-NODES = (40, 80, 160, 320, 640, 1280)
-#: Order of convergence of the values extrapolated from two grids. The error of such a value is estimated as `FACTOR`
-#: times its change from the previous grid, or `FACTOR` times an eighth of the change before that, if this is larger
-#: (see `refine`).
-ORDER = 3.0
-FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Number of nodes of two preliminary grids. Their solutions only determine the density of nodes for the grids of
-#: `NODES`.
-ADAPTED_NODES = 161
+NODES = (40, 80, 160, 320, 640, 1280)  # of the grids; on the finest, a Newton step takes about 0.1 s
+ORDER = 3.0  # order of convergence of the values extrapolated from two grids
+PRELIMINARY = 2  # index in `NODES` of the grid whose solution determines the density of nodes of all grids
 #: Settings of the attempts at the first solution: the factor by which the expected film is multiplied; the largest
 #: guess of the film, divided by the square of the inlet position; the number of nodes; and the limits of Newton's
 #: method. The second attempt is slow but hardly ever fails.
@@ -41,11 +34,8 @@ ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
 #: Limits of Newton's method on all further grids. The first pair of limits is for a guess extrapolated from earlier
 #: grids. If this attempt fails, the second pair is for a guess that equals the solution on the previous grid.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-#: The stated error of a position is never smaller than this number of cells.
-PLACED = 0.1
-#: The stated error of a profile at a position is the largest error within this distance of the position, in cells of
-#: the second finest grid.
-REACH = 2.0
+PLACED = 0.1  # least stated error of a position, in cells
+REACH = 2.0  # the error of a profile is the largest within this distance, in cells of the second finest grid
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
@@ -224,7 +214,7 @@ def _error(values: Sequence[FloatArray]) -> FloatArray:
         return np.full_like(values[-1], np.inf)
     changes = np.abs(np.diff(values[-3:], axis=0))
     before = np.nan_to_num(changes[-2] if len(changes) > 1 else 0.0 * changes[-1]) / 2.0**ORDER
-    return np.asarray(FACTOR * np.maximum(changes[-1], before))
+    return np.asarray(SAFETY / (2.0**ORDER - 1) * np.maximum(changes[-1], before))
 
 
 def _solve_on(
@@ -251,7 +241,7 @@ def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
         if outcome == Outcome.CONVERGED:
             break
     for _ in range(2 if outcome == Outcome.CONVERGED else 0):
-        adapted_outcome, adapted = _refined(case, [state], state, ADAPTED_NODES)
+        adapted_outcome, adapted = _refined(case, [state], state, NODES[PRELIMINARY])
         if adapted_outcome == Outcome.CONVERGED:
             state = adapted
     return outcome, state
@@ -315,7 +305,7 @@ def solve_film(
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
 
     def add(count: int) -> Outcome:
-        before = solved[-2:] if solved and solved[-1].nodes.size > ADAPTED_NODES else [source]
+        before = solved[-2:] if solved and count > NODES[PRELIMINARY] else [source]
         outcome, found = _refined(case, before, source, count)
         if outcome == Outcome.CONVERGED:
             solved.append(found)

@@ -14,17 +14,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-#: If the asperities carry less than this share of the load, they are neglected. The relative error of the film is then
-#: at most a quarter of this share.
-_NEGLIGIBLE = 1e-9
-#: Natural logarithm of the smallest load share of the film that is tried.
-_LEAST_LOGARITHM = -256.0
-#: The film is accepted if the load shares add up to one within the tolerance times this factor.
-_BALANCE = 100.0
-#: Distances between the mean heights of two lines, in units of the rms height. At `_CLOSED`, the mean gap is about
-#: 1e-301. Beyond `_APART`, the mean overlap is less than the rounding error of the distance.
-_CLOSED = -37.0
-_APART = 9.0
+_CLOSED = -37.0  # distance between mean heights, in rms heights, at which the mean gap is about 1e-301
 
 
 def mean_overlap(distance: float) -> float:
@@ -37,12 +27,10 @@ def mean_overlap(distance: float) -> float:
 
 def distance_of_means(gap: float) -> float:
     """Return the distance d (see `mean_overlap`) at which the mean gap ``<(d - z)+>`` is `gap`; unit: rms height."""
-    if gap > _APART:
-        return gap
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
-    # the mean gap at d is the mean overlap at -d, and its logarithm varies slowly with d
-    return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, _APART, xtol=1e-13))
+    # the mean gap at d is the mean overlap at -d, is not less than d, and its logarithm varies slowly with d
+    return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, gap + 1, xtol=1e-13))
 
 
 class Asperities(NamedTuple):
@@ -89,16 +77,16 @@ def share_load(
         return asperity_share(film_at(share)) + share - 1.0
 
     alone = film_at(1.0)
-    if asperity_share(alone) < _NEGLIGIBLE:
+    if asperity_share(alone) < tolerance:
         return SharedLoad(alone, 1.0, asperity_share(alone))
     lowest = -1.0
     while excess(lowest) > 0:
         lowest *= 2
-        if lowest < _LEAST_LOGARITHM:
+        if exp(lowest) == 0:
             return SharedLoad(0.0, 0.0, 1.0)
     share = exp(float(brentq(excess, lowest, 0.0, xtol=tolerance)))
     film = film_at(share)
     carried = asperity_share(film)
-    if abs(carried + share - 1.0) > _BALANCE * tolerance:
+    if abs(carried + share - 1.0) > sqrt(tolerance):
         return SharedLoad(0.0, 0.0, 1.0)  # `film_at` jumps to 0 at this share, and the load is not in balance
     return SharedLoad(film, share, min(carried, 1.0))

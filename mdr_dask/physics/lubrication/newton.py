@@ -20,19 +20,11 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-#: In the upwind Couette flux, the value at a face is a weighted mean of a quadratic interpolation (QUICK), with this
-#: weight, and of a linear extrapolation from upstream.
-_QUADRATIC = 1.0 / 3.0
-#: One step may reduce the film at a node by at most this fraction of the film.
-_FILM_SHARE = 0.8
-#: If only this fraction of a step or less is allowed, the film counts as collapsed.
-_LEAST_SHARE = 1e-9
-#: The factorised Jacobian is reused if the last step was smaller than this fraction of the step before.
-_SHRINKS = 0.1
-#: The iteration ends after a step whose relative size is below this value. The remaining error is about the square of
-#: this size. After a step with a reused Jacobian, the remaining error is larger, so the size must be a hundred times
-#: smaller.
-_TOLERANCE = 1e-4
+_QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; the rest is linear upwind
+_FILM_SHARE = 0.8  # one step may reduce the film at a node by at most this fraction
+_LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
+_SHRINKS = 0.1  # a factorised Jacobian is reused while steps shrink at least by this factor
+_TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # relative size of the last step
 
 
 class Grid(NamedTuple):
@@ -127,7 +119,8 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     """Return the weights of the nodes f-1, f and f+1 in an interpolated value halfway between f and f+1.
 
-    The liquid flows from node f to node f+1.
+    The liquid flows from node f to node f+1. The value is a weighted mean of a quadratic interpolation and of a
+    linear extrapolation from upstream (see `_QUADRATIC`).
     """
     if f == 0:
         return 0.0, 0.5, 0.5
@@ -348,24 +341,23 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
     solved, factors, b = listed[:0], None, np.empty(0)
-    size, before, last = np.inf, 1.0, _TOLERANCE
+    size, before = np.inf, 1.0
     for steps in range(pace.most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
         # at least two steps are taken, because the first step may be small by chance
-        if steps > 1 and size < last and same:
+        if steps > 1 and size < _TOLERANCE and same:
             return Iterate(Outcome.CONVERGED, P, central, H)
         if steps == pace.most:
             break
         if same and size < _SHRINKS * before:
             _fill_imbalance(grid, P, found.value, active, b)
-            last = 0.01 * _TOLERANCE
         else:
             solved, b = active.copy(), np.empty(active.size + 1)
             A = workspace[: b.size**2].reshape(b.size, b.size)
             _fill_equations(grid, P, found, active, A, b)
-            factors, last = factorise(A), _TOLERANCE
+            factors = factorise(A)
         if factors is None:
             return Iterate(Outcome.SINGULAR, P, central, H)
         solution = factors.solve(b)

@@ -13,14 +13,7 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 
-_MM2 = 1e-6
-#: Density of water at 15.6 C in kg/m^3. A specific gravity is a density divided by this density.
-WATER_DENSITY = 999.016
-#: Reference temperature of specific gravities: 60 F, in K.
-SPECIFIC_GRAVITY_TEMPERATURE = 288.705555
-#: Coefficient of thermal expansion (1/K) of lubricating oils at 60 F, times their density (kg/m^3) at 60 F (ASTM D1250,
-#: table 54D).
-_LUBRICANT_EXPANSION = 0.6278
+_LUBRICANT_EXPANSION = 0.6278  # expansion in 1/K times density in kg/m^3, both at 60 F (ASTM D1250, table 54D)
 
 #: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: the pair (s, t) for each kind of oil, quoted from
 #: memory from Gold et al. 2001 (see docs/evidence/mixed-lubrication.md).
@@ -61,11 +54,11 @@ def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[flo
     T, nu = (np.asarray(each, dtype=np.float64) for each in (temperature, viscosity))
     if np.unique(T).size < 2:
         raise ValueError(f"expected viscosities at two temperatures or more, got all of them at {float(T[0])!r} K")
-    if nu.min() < 2 * _MM2:
+    if nu.min() < 2e-6:
         raise ValueError(
             f"expected kinematic viscosities of at least 2 mm^2/s (ASTM D341), got {float(nu.min())!r} m^2/s"
         )
-    slope, A = np.polyfit(np.log10(T), np.log10(np.log10(nu / _MM2 + 0.7)), 1)
+    slope, A = np.polyfit(np.log10(T), np.log10(np.log10(nu / 1e-6 + 0.7)), 1)
     if slope >= 0:
         raise ValueError(
             f"expected viscosities that fall with temperature, got {nu.tolist()!r} m^2/s at {T.tolist()!r} K"
@@ -76,7 +69,7 @@ def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[flo
 def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArray:
     """Return the kinematic viscosity in m^2/s at a temperature in K by ASTM D341 (Walther)."""
     exponent = 10.0 ** (A - B * np.log10(np.asarray(temperature, dtype=np.float64)))
-    return np.asarray((10.0**exponent - 0.7) * _MM2)
+    return np.asarray((10.0**exponent - 0.7) * 1e-6)
 
 
 def density_at(temperature: ArrayLike, density: float, reference_temperature: float) -> FloatArray:
@@ -110,7 +103,7 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
     if correlation not in GOLD:
         raise ValueError(f"expected one of the correlations {', '.join(CORRELATIONS)}, got {correlation!r}")
     factor, exponent = GOLD[correlation]
-    return np.asarray(factor * (np.asarray(kinematic, dtype=np.float64) / _MM2) ** exponent * 1e-9)
+    return np.asarray(factor * (np.asarray(kinematic, dtype=np.float64) / 1e-6) ** exponent * 1e-9)
 
 
 @dataclass(frozen=True)
@@ -175,8 +168,8 @@ OILS: dict[str, Oil] = {
         nu1=335e-6,
         T2=373.15,
         nu2=38.3e-6,
-        density=0.860 * WATER_DENSITY,
-        density_temperature=SPECIFIC_GRAVITY_TEMPERATURE,
+        density=0.860 * 999.016,  # specific gravity times the density of water at 60 F
+        density_temperature=288.705555,  # 60 F
         correlation="gold_polyalphaolefin",
         lowest=313.15,
         highest=373.15,
@@ -186,9 +179,8 @@ OILS: dict[str, Oil] = {
 }
 
 
-#: Roelands' constants: the reference pressure p_r in Pa, and the term 9.67 of ``ln eta0 + 9.67`` with eta0 in Pa s.
-ROELANDS_PRESSURE = 1.9609e8
-ROELANDS_LOGARITHM = 9.67
+ROELANDS_PRESSURE = 1.9609e8  # p_r in Pa
+ROELANDS_LOGARITHM = 9.67  # of ln eta0 + 9.67, with eta0 in Pa s
 
 
 def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
@@ -223,6 +215,5 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
     )
 
 
-#: Constants of the density law in 1/Pa (thesis eq. B.6).
-DENSITY_RISE = 0.6e-9
-DENSITY_SATURATION = 1.7e-9
+DENSITY_RISE = 0.6e-9  # in 1/Pa (thesis eq. B.6)
+DENSITY_SATURATION = 1.7e-9  # in 1/Pa (thesis eq. B.6)
