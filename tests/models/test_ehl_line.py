@@ -12,8 +12,9 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.ehl_line.declaration import ACCURACY, MODEL, STEEL, EhlLineParameters, coordinates
+from mdr_dask.models.ehl_line.declaration import MODEL, STEEL, EhlLineParameters, coordinates
 from mdr_dask.models.ehl_line.solve import compute, distinct
+from mdr_dask.physics.lubrication.line_contact import ACCURACY
 
 CHECKED = {"load_parameter": 2.0452e-5, "speed_parameter": 1e-11, "material_parameter": 5007.0}
 #: The same contact by quantities with units: R = 20 mm, eta0 = 0.1 Pa s.

@@ -10,12 +10,8 @@ from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
-from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
-
-#: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
-STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Largest allowed relative error of the film thickness if the campaign states no accuracy.
-ACCURACY = 1e-3
+from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
+from mdr_dask.physics.lubrication.film_formulas import STEEL
 
 #: Each row contains a dimensionless number, the dimensional quantity that a user can give instead, and the other
 #: parameters that are then also required. For example, `line_load` with `radius` replaces `load_parameter`.
@@ -209,26 +205,6 @@ def positions(parameters: EhlLineParameters) -> FloatArray:
     return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
 
 
-distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
-
-
-def operations(block: Block[EhlLineParameters]) -> float:
-    """Return the approximate number of operations that `compute` needs for a block.
-
-    The operations of one solution were measured: about 6 million with the default accuracy. If a campaign with an
-    accuracy requests the pressure or its spike, a solution needs the finest grid and 1.5 billion operations.
-    """
-    accuracy = block.accuracy or ACCURACY
-    is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
-    each = 1.5e9 if is_sharp else 6e6 * float(np.clip((ACCURACY / accuracy) ** 0.4, 0.8, 30.0))
-    return each * float(distinct(block))
-
-
-def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory in bytes of a solution on the finest grid: about three matrices of 1281 x 1281 numbers."""
-    return 3.0 * 8 * 1281**2
-
-
 def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
     """Return the positions at which film and pressure are stored, as a coordinate."""
     return {
@@ -238,18 +214,19 @@ def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
     }
 
 
+_SOLVE = "mdr_dask.models.ehl_line.solve"
 MODEL = Model(
     name="ehl_line",
     version=11,
     summary="film, pressure and traction of a lubricated line contact (elastohydrodynamic)",
     parameters=EhlLineParameters,
     outputs=OUTPUTS,
-    compute=deferred("mdr_dask.models.ehl_line.solve", "compute"),
-    operations=operations,
+    compute=deferred(_SOLVE, "compute"),
+    operations=deferred(_SOLVE, "operations"),
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
-    distinct=distinct,
-    memory=memory,
+    distinct=deferred(_SOLVE, "distinct"),
+    memory=deferred(_SOLVE, "memory"),
     numbers=(
         Number("load_parameter", "line_load / (2 * contact_modulus * radius)", "load parameter W = w/(E' R)"),
         Number(

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.ehl_line.declaration import ACCURACY, MODEL, EhlLineParameters, groups, positions
+from mdr_dask.models.ehl_line.declaration import MODEL, EhlLineParameters, groups, positions
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.lubrication import traction
 from mdr_dask.physics.lubrication.film_formulas import (
@@ -18,7 +18,18 @@ from mdr_dask.physics.lubrication.film_formulas import (
     square_of_half_width,
     thick_film,
 )
-from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, Reading, line_contact, solve_film
+from mdr_dask.physics.lubrication.line_contact import (
+    ACCURACY,
+    NODES,
+    LineContact,
+    LineSolution,
+    Reading,
+    line_contact,
+    solve_film,
+)
+from mdr_dask.physics.lubrication.line_contact import (
+    operations as solution_operations,
+)
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
@@ -167,3 +178,17 @@ def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[floa
 def distinct(block: Block[EhlLineParameters]) -> int:
     """Return the number of different solutions among the cases of a block."""
     return len(set(_line_contacts(block)))
+
+
+def operations(block: Block[EhlLineParameters]) -> float:
+    """Return the approximate number of operations of a block: the entries of the matrices of all Newton steps.
+
+    If a campaign with an accuracy requests the pressure or its spike, a solution needs the finest grid.
+    """
+    is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
+    return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * distinct(block)
+
+
+def memory(_: Block[EhlLineParameters]) -> float:
+    """Return the memory in bytes of a solution on the finest grid: about three matrices of floating-point numbers."""
+    return 3.0 * 8 * (NODES[-1] + 1) ** 2

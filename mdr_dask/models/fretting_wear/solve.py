@@ -26,7 +26,8 @@ from mdr_dask.models.fretting_wear.reduction import (
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
 from mdr_dask.physics.wear import rules
-from mdr_dask.physics.wear.exact import COARSEST_OF_MOVING, exact
+from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.exact import operations as exact_operations
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn, virgin_load
 
@@ -35,12 +36,10 @@ _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border"
 #: Outputs that have another name in `Worn`, each with its name there. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Tolerance of a solution: largest allowed error of the worn profile, divided by eta d0. The tolerance is `_USUAL` if
-#: the campaign states no accuracy. It is never below `_FINEST`.
+#: Tolerance of a solution if the campaign states no accuracy, and the smallest tolerance: error of the worn profile,
+#: divided by eta d0.
 _USUAL, _FINEST = 1e-3, 1e-5
-#: If the campaign states an accuracy, the tolerance of the first solution is `_FIRST` times the accuracy. If an output
-#: then misses the accuracy, the case is solved again with `_FINER` times this tolerance.
-_FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
+_FINER = 0.25  # tolerance of the first solution over the accuracy, and of a further solution over the tolerance before
 
 #: Indices (case, realisation) in a block.
 Places = list[tuple[int, int]]
@@ -94,25 +93,16 @@ def operations(block: Block[FrettingWear]) -> float:
     """Return the approximate number of operations of a block."""
     parameters, size = block.parameters, block.cases * len(block.realisations)
     if _is_plain(block):
-        return 1e7 + 1e4 * size
+        return 1e4 * size  # about ten integrals with 64 nodes
     if parameters.history:
-        return 1e7 + 120.0 * parameters.cells**3 * size
-    accuracy = _first_resolution(block.accuracy, parameters.hold)
-    followed, forced = _followed(parameters.hold, accuracy), parameters.hold == "force"
-    of_rules = {"limit": followed if forced else 1e6, "fast": 1e6, "exact": followed}
-    each = of_rules[parameters.wear_rule]
+        return 120.0 * parameters.cells**3 * size  # 12 n^2 in each of about 10 n steps on n cells
     numbers, _ = reduce_block(block)
     moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
-    solves = moments if parameters.wear_rule == "fast" else _count(numbers.exponent, numbers.level)
-    moment = 4e6 if parameters.wear_rule == "exact" else 7e5
-    return float(1e7 + each * solves + moment * moments + 5e4 * size)
-
-
-def _followed(hold: str, accuracy: float) -> float:
-    """Return the number of operations of one wear solution and its error estimate, without the evaluation at each N."""
-    if hold == "force":
-        return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
-    return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
+    of_profiles = 1e4 * parameters.points  # integrals over about 20 pieces with 24 nodes
+    if parameters.wear_rule != "exact" and parameters.hold == "depth":
+        return of_profiles * moments
+    solution = exact_operations(_first_resolution(block.accuracy), constant_force=parameters.hold == "force")
+    return 3 * (solution * _count(numbers.exponent, numbers.level) + of_profiles * moments)  # two more for the errors
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
@@ -318,9 +308,9 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
     )
 
 
-def _first_resolution(accuracy: float | None, hold: str) -> float:
+def _first_resolution(accuracy: float | None) -> float:
     """Return the tolerance of the first solution: the allowed error of the worn profile, divided by eta d0."""
-    return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
+    return _USUAL if accuracy is None else max(_FINER * accuracy, _FINEST)
 
 
 def _contacts(
@@ -331,7 +321,7 @@ def _contacts(
     A pair that misses the accuracy is solved again at a finer resolution. The final resolution of a result depends only
     on its own case.
     """
-    resolution, left = _first_resolution(block.accuracy, task.hold), list(range(len(wanted)))
+    resolution, left = _first_resolution(block.accuracy), list(range(len(wanted)))
     errors = block.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:

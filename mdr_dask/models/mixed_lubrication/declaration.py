@@ -9,9 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError, distinguishable
-from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.mixed_lubrication.lines import (
-    LEAST_PER_WAVE,
     MOST_POINTS,
     Generated,
     Measured,
@@ -21,15 +20,11 @@ from mdr_dask.models.mixed_lubrication.lines import (
 )
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
-from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
+from mdr_dask.physics.lubrication.film_formulas import STEEL, HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil
 
 Positive = Annotated[float, Field(gt=0)]
-#: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
-STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Circumference of a roller divided by the shortest wavelength, if a user gives neither `shortest_wavelength` nor
-#: `points`.
-WAVES = 100_000
+WAVES = 100_000  # default circumference of a roller over the shortest wavelength
 #: Positions at which the profiles are stored, divided by the half width of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
@@ -328,36 +323,15 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     }
 
 
-#: Parameters on which the rough lines depend. Cases with equal values of all these parameters share their lines.
-OF_LINES = {
-    *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
-    *("roller_radius", "roller_width", "contact_modulus"),
-}
-
-
-def operations(block: Block[MixedLubrication]) -> float:
-    """Return the approximate number of operations of a block. Only the two coarsest grids of every case are counted."""
-    columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
-    points_of = np.empty(block.cases)
-    for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
-        waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
-        points_of[case] = 3 * LEAST_PER_WAVE * waves if points == "auto" else 1.5 * points
-    creep = block.numbers("slide_roll_ratio") != 0
-    of_case = 3e6 + np.where(creep, 60.0, 11.0) * points_of
-    films = 6e7 * float(np.sum(block.column("film_formula") == "ehl"))
-    keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
-    lines = {tuple(str(block.columns[key][k]) for key in keys): points_of[k] for k in range(block.cases)}
-    return films + len(block.realisations) * float(40.0 * sum(lines.values()) + np.sum(of_case))
-
-
+_SOLVE = "mdr_dask.models.mixed_lubrication.solve"
 MODEL = Model(
     name="mixed_lubrication",
     version=14,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,
-    compute=deferred("mdr_dask.models.mixed_lubrication.solve", "compute"),
-    operations=operations,
+    compute=deferred(_SOLVE, "compute"),
+    operations=deferred(_SOLVE, "operations"),
     whole=(
         "normal_force",
         "rotation_speed",

@@ -11,11 +11,9 @@ from mdr_dask.errors import distinguishable
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
 
-#: Largest number of points of a line.
-MOST_POINTS = 10**7
-#: With `points: auto`, the coarsest grid has `LEAST_PER_WAVE` points per shortest wavelength. This number is doubled up
-#: to `DOUBLINGS` times.
-LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
+MOST_POINTS = 10**7  # of a line: capacity of the memory
+LEAST_PER_WAVE = 2.5  # points per shortest wavelength on the coarsest of the grids for `points: auto`; 2 is the least
+DOUBLINGS = 3  # largest number of finer grids for `points: auto`
 
 
 def points_for(modes: int) -> tuple[int, ...]:

@@ -14,9 +14,6 @@ from mdr_dask.physics.lubrication.film_formulas import HertzLine
 from mdr_dask.physics.lubrication.load_sharing import Asperities, SharedLoad, share_load
 from mdr_dask.physics.outcome import Outcome
 
-#: Largest allowed relative error of the film thickness in an EHL solution if the campaign states no accuracy.
-ACCURACY = 1e-3
-
 
 class NoFilmError(Exception):
     """Raised if the film of a case cannot be computed. The message states the reason."""
@@ -87,7 +84,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
     contact = case.dry_contact(case.normal_force)
     scale = case.rms_roughness or 1.0
     asperities = Asperities(scale * source.combined_rms(), case.longest(), case.contact_modulus)
-    accuracy = accuracy or ACCURACY
+    accuracy = accuracy or line_contact.ACCURACY
     film_of = _film_of(case, viscosity, alpha, accuracy)
     shared, error, warning = _shared_load(case, asperities, film_of, accuracy)
     return Operation(

@@ -15,11 +15,8 @@ from mdr_dask.physics.lubrication import breakthrough, film_formulas
 from mdr_dask.physics.lubrication.clusters import find_clusters
 from mdr_dask.physics.surfaces.splines import heights
 
-#: Largest number of parts into which a revolution is divided. The scatter between the parts gives the standard error.
-PARTS = 16
-#: With sliding, the distance between neighbouring windows on the coarsest grid is the width of a window divided by this
-#: number. At this distance, neighbouring windows have nearly the same contact.
-WINDOWS = 4
+PARTS = 16  # most parts of a revolution; the scatter between them gives the standard error
+WINDOWS = 4  # with sliding: windows on the coarsest grid in the width of one window
 
 
 @dataclass(frozen=True)

@@ -11,25 +11,25 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.mixed_lubrication.declaration import DRAWN, MODEL, MixedLubrication, coordinates
-from mdr_dask.models.mixed_lubrication.lines import Source
+from mdr_dask.models.mixed_lubrication.declaration import DRAWN, MODEL, WAVES, MixedLubrication, coordinates
+from mdr_dask.models.mixed_lubrication.lines import LEAST_PER_WAVE, Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
-from mdr_dask.models.mixed_lubrication.revolution import Revolution, drawn, revolve, values
+from mdr_dask.models.mixed_lubrication.revolution import WINDOWS, Revolution, drawn, revolve, values
 from mdr_dask.models.parts.accuracy import missed_accuracy
+from mdr_dask.physics.lubrication import line_contact
 from mdr_dask.physics.refine import Solution, refine
 
-#: Lowest film ratio without a warning. Below it, asperities merge into large clusters that do not break the layer.
-LEAST_FILM_RATIO = 0.5
 #: `_OF_LENGTH`: outputs that follow from the length in intimate contact. `_OF_LINES`: outputs that need rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
 #: Outputs that can be zero, each with a floor. If an output is smaller than its floor, its relative error is the error
 #: divided by the floor. The floor of the contact length is in units of the width of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
-#: Lower bound of the order at which probability and length converge with decreasing spacing of the points. The splines
-#: converge faster. But a single cluster may break the layer on one grid and not on the next grid, and contact may begin
-#: between two windows.
-_ORDER = 1
+#: Parameters on which the rough lines depend. Cases with equal values of all these parameters share their lines.
+_SHARED = {
+    *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
+    *("roller_radius", "roller_width", "contact_modulus"),
+}
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
@@ -128,7 +128,9 @@ def _realise(
     if block.accuracy is None:  # two grids if errors are requested, otherwise one
         points = points[:2] if any(f"{name}_error" in block.outputs for name in _OF_LINES) else points[:2][-1:]
     accuracy = block.accuracy or np.inf
-    errors = refine(solve, len(members), points, accuracy, _ORDER, floors=floors).errors
+    # splines converge faster than at first order, but a single cluster may break the layer on one grid and not on the
+    # next grid, and contact may begin between two windows
+    errors = refine(solve, len(members), points, accuracy, order=1, floors=floors).errors
     for k, (index, operation) in enumerate(members):
         of_length = errors[-1, k] * operation.width if with_length else np.nan
         numbers = values(operation, found[k], np.array([errors[0, k], of_length]))
@@ -150,8 +152,28 @@ def _warnings(operation: Operation) -> Iterator[str]:
     """Yield a warning for each assumption of the model that a case violates."""
     if operation.warning:
         yield operation.warning
-    if operation.film / operation.rms < LEAST_FILM_RATIO:
+    if operation.film / operation.rms < 0.5:
         yield (
-            f"the film ratio is below {LEAST_FILM_RATIO}: asperities merge into large clusters that do not "
+            "the film ratio is below 0.5: asperities merge into large clusters that do not "
             "break the layer, so the probability is too low"
         )
+
+
+def operations(block: Block[MixedLubrication]) -> float:
+    """Return the approximate number of operations of a block. Only the two coarsest grids of every case are counted.
+
+    Per point, a line needs about 40 operations (Fourier transform and spline), and a case 10 (clusters); with sliding,
+    every point lies in `WINDOWS` windows or more. An EHL film needs about ten solutions to share the load.
+    """
+    columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
+    points_of = np.empty(block.cases)
+    for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
+        waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
+        points_of[case] = 3 * LEAST_PER_WAVE * waves if points == "auto" else 1.5 * points
+    sliding = block.numbers("slide_roll_ratio") != 0
+    of_cases = 10.0 * float(np.sum(np.where(sliding, WINDOWS, 1) * points_of))
+    keys = [path for path in block.columns if path.partition(".")[0] in _SHARED]
+    lines = {tuple(str(block.columns[key][k]) for key in keys): points_of[k] for k in range(block.cases)}
+    films = 10.0 * line_contact.operations(block.accuracy or line_contact.ACCURACY)
+    solved = int(np.sum(block.column("film_formula") == "ehl"))
+    return films * solved + len(block.realisations) * (40.0 * sum(lines.values()) + of_cases)

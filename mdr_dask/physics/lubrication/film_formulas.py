@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray
 
-
 STEEL = 210e9 / (2 * (1 - 0.3**2))  # contact modulus of steel on steel in Pa: E = 210 GPa and nu = 0.3 for both
 
 

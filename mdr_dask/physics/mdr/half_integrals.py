@@ -32,13 +32,6 @@ class Mesh(NamedTuple):
     nodes: FloatArray
     barycentric: FloatArray
 
-    def extended(self, end: float) -> Mesh:
-        """Return the mesh with one more panel, which ends at `end`."""
-        last = self.edges[-1]
-        local = (self.nodes[-self.order :] - self.edges[-2]) / (last - self.edges[-2])
-        nodes = np.append(self.nodes, last + (end - last) * local)
-        return Mesh(np.append(self.edges, end), self.order, nodes, np.vstack([self.barycentric, self.barycentric[-1:]]))
-
 
 @dataclass(frozen=True, eq=False)
 class Panels:

@@ -25,7 +25,7 @@ _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 MOST_STEPS = 20000  # a march with more steps fails: limit of computing time
 MOST_ITERATIONS = 12  # Newton iterations of one step; a step that is short enough needs about three
-GROWTH = 1.8  # largest ratio of a step to the previous step: zero-stability of BDF 3 (Calvo et al. 1990)
+GROWTH = 1.8  # largest ratio of a step to the previous step: formulas of order 3 need a bound to be stable
 TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # of Newton's method, and step of its finite differences
 
 

@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.wear.evolution import NotConvergedError, at, integral_along, march
+from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, integral_along, march
 from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
@@ -34,26 +34,16 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-COARSEST = 2e-3
-"""Largest error for which panels and steps are chosen, because coarser panels do not resolve the image of a steep
-body.
-"""
-COARSEST_OF_MOVING = 3e-4
-"""The same limit for constant force, where longer steps cannot follow the stick border."""
+COARSEST = 2e-3  # largest error for which panels are chosen: coarser panels do not resolve the image of a steep body
+COARSEST_OF_MOVING = 3e-4  # the same for constant force, where longer steps cannot follow the stick border
+#: If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
+#: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is then below the rounding error.
 ENDED = 1e4
-"""If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
-falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is then below the rounding error.
-"""
-JUMP = 0.1
-"""If y = 1 - (d - g) / eta exceeds this value in the panel next to the border, the border no longer moves."""
-ROUGHER = 4.0
-"""Ratio of the step tolerance of each coarser solution to that of the previous solution."""
+JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta in the panel next to the border exceeds this value
+ROUGHER = 4.0  # ratio of the step tolerance of each coarser solution to that of the previous solution
+#: The stated error of a radius is at least this fraction of its change in the last time step. All solutions share this
+#: error: a position that the edge passes within a step begins to wear only at the end of the step.
 EDGE = 0.2
-"""The stated error of a radius is at least this fraction of its change in the last time step. All solutions share this
-error: a position that the edge passes within a step begins to wear only at the end of the step.
-"""
-NEAR_AXIS = 1e-5
-"""Radius, in units of a0, at which the exponent of a body at its tip is evaluated."""
 
 
 class Resolution(NamedTuple):
@@ -74,8 +64,7 @@ class Resolution(NamedTuple):
     def panels(self, near: int) -> Panels:
         """Return the panels for partial slip, which are halved `near` more times towards the stick border."""
         digits = -np.log10(self.accuracy)
-        # with fewer halvings, the error of the panels at the moving edge would make the steps very short
-        levels = max(round(2.7 * digits - 3.3), 2)
+        levels = round(2.7 * digits - 3.3)
         order = max(int(digits) + 1, 4)
         left, right = (max(halvings - self.rougher, 0) for halvings in (levels + near, levels))
         return graded_panels(left, right, order - min(self.rougher, 1))
@@ -147,8 +136,7 @@ def exact(
     else:
         check_stick_radius(stick_radius)
         solve = partial(_fretted, profile, stick_radius, wanted, constant_force)
-    coarsest = COARSEST_OF_MOVING if constant_force and stick_radius > 0.0 else COARSEST
-    resolution = Resolution(min(accuracy, coarsest))
+    resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force and stick_radius > 0.0 else COARSEST))
     found, rougher = solve(resolution), []
     if errors:
         rougher.append(solve(resolution._replace(rougher=1)))
@@ -160,6 +148,17 @@ def exact(
         for amount, one in found.items()
     }
     return [contacts[float(amount)] for amount in amounts]
+
+
+def operations(accuracy: float, *, constant_force: bool) -> float:
+    """Return the approximate number of operations of a solution in partial slip: n^3 for each time step with n nodes.
+
+    The steps first grow by the factor `GROWTH`, beginning with the error allowed in a step. Then this error limits the
+    steps, at third order. Under constant force, the evolution has two parts.
+    """
+    resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force else COARSEST))
+    steps = float(np.log(1.0 / resolution.step) / np.log(GROWTH) + resolution.step**-0.25)
+    return (2.0 if constant_force else 1.0) * steps * resolution.panels(5 if constant_force else 2).nodes.size ** 3
 
 
 class _Leg(NamedTuple):
@@ -370,7 +369,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
     Near the axis, f ~ r^n = (r^2)^(n/2), so a body with n < 2 needs smaller panels there.
     """
-    near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
+    near, far = profile.image(np.array([1e-5, 2e-5]))
     sharpness = max(2.0 / float(np.log2(far / near)), 1.0) if near > 0.0 else 1.0
     problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
     if constant_force:

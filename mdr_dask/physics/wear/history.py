@@ -16,11 +16,6 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.uniform_grid import UniformGrid, uniform_grid
 from mdr_dask.physics.wear.worn import Worn
 
-STEP_SHARE = 0.45
-"""Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings."""
-LEAST_EDGE_ERROR = 0.5
-"""Least stated error of contact radius and stick border, in cell widths; two grids may agree by chance."""
-
 
 @dataclass(frozen=True)
 class LoadBlock:
@@ -50,7 +45,8 @@ def history(
         _run(profile, blocks, uniform_grid(number, length))
         for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
     )
-    least = dict.fromkeys(("contact_radius", "stick_border"), LEAST_EDGE_ERROR * length / cells)
+    # at least half a cell, because two grids may agree by chance
+    least = dict.fromkeys(("contact_radius", "stick_border"), 0.5 * length / cells)
     return [replace(one, rougher=tuple(others), least_errors=least) for one, *others in zip(fine, *rough, strict=True)]
 
 
@@ -79,7 +75,7 @@ def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: Lo
     """Return the worn depth and the dissipated energy divided by mu after a block, by Heun's method."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
-        step = min(STEP_SHARE * 1.7 * grid.spacing, block.cycles - done)
+        step = min(0.85 * grid.spacing, block.cycles - done)  # half of the largest stable step
         first = _state(grid, image_0 + grid.forward @ worn, block)
         rate = first.pressure * first.slip
         second = _state(grid, image_0 + grid.forward @ (worn + step * rate), block)

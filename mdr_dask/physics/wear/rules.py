@@ -20,18 +20,10 @@ from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.worn import Scar, Worn, beyond_table, check_stick_radius, worn_by
 
-NODES = 16
-"""Number of Gauss nodes in each of the four pieces of integration; it is sufficient for the accuracy `ERROR`."""
-LAYER_GROWTH = 30.0
-"""Ratio of the widths of successive pieces of integration at the stick border."""
-LEAST = 1e-30
-"""Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off."""
-SCAR, END = 1e-10, 1e-13
-"""Tolerances, divided by eta, of the integral that vanishes at the radius of the scar: `SCAR` in the fast rule, `END`
-(about the rounding error) in the limiting profile.
-"""
-ERROR = 2e-6
-"""Numerical error of every output divided by its largest value, without the error of the fast rule itself."""
+LAYER_GROWTH = 30.0  # ratio of the widths of successive pieces of integration at the stick border
+SCAR = 1e-10  # tolerance, over eta, of the integral that vanishes at the radius of the scar
+ERROR = 2e-6  # numerical error of every output over its largest value, without the error of the fast rule itself
+EPS = float(np.finfo(np.float64).eps)
 _NO_TABLE = PowerProfile(1.0).pieces()
 
 
@@ -92,7 +84,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
         between 0.9 and 1.
     """
     radius = limit_radius(profile, stick_radius)
-    rest = max(math.exp(-xi * cycles / radius), LEAST)
+    rest = max(math.exp(-xi * cycles / radius), EPS)  # no layer at the stick border that is thinner than round-off
     return _worn(profile, _rule(profile, stick_radius, rest), radius, 1.0)
 
 
@@ -116,7 +108,7 @@ def fast_cases(
 
 
 def _quadrature() -> Quadrature:
-    return Quadrature(*gauss(NODES), np.empty(5))
+    return Quadrature(*gauss(16), np.empty(5))  # 16 nodes are sufficient for the accuracy `ERROR`
 
 
 def _rule(profile: Profile, c: float, rest: float) -> Rule:
@@ -232,7 +224,6 @@ def _scar_radius(
     """
     if not high_value < 0.0 < low_value:
         return high
-    error = END if rule.rest == 0.0 else SCAR
     radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
     for _ in range(100):
         value, last = _scar_integral(rule, radius, 0, quadrature), radius
@@ -245,7 +236,7 @@ def _scar_radius(
             low_value *= share if replaced > 0 else 1.0
             high, high_value, replaced = radius, value, 1
         radius = (low * high_value - high * low_value) / (high_value - low_value)
-        if abs(value) < error * rule.eta or abs(radius - last) < 4e-16 * radius:
+        if abs(value) < SCAR * rule.eta or abs(radius - last) < 2.0 * EPS * radius:
             break
     return radius
 
@@ -314,7 +305,7 @@ def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatA
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
-        rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), LEAST))
+        rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), EPS))
         result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
     return result
 

@@ -22,8 +22,8 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import TOLERANCE, Moment, settled
 
-#: Weight of the stick border in the error of a step, relative to the weight of the depth. The weight of the border is
-#: large, because f rises like a square root beyond the border.
+#: Weight of the stick border in the error of a step, relative to the weight of the depth: f rises like a square root
+#: beyond the border.
 BORDER_WEIGHT = 30.0
 _ABSCISSA, _WEIGHT = gauss(3)
 

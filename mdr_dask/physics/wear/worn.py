@@ -21,12 +21,10 @@ from mdr_dask.physics.refine import SAFETY
 #: Outputs that are functions of position, and the attributes of `Worn` that compute them; other outputs are numbers.
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
-JUMP_WIDTH = 1e-9
-"""Distance from a border, as a fraction of the border's radius, within which a change of the image counts as a jump."""
+JUMP_WIDTH = 1e-9  # a change of the image within this distance from a border, over its radius, is a jump
+#: The error of a function is the largest difference within this number of neighbours, because the difference of two
+#: functions vanishes where they intersect.
 REACH = 5
-"""The error of a function is the largest difference within this number of neighbours, because the difference of two
-functions vanishes where they intersect.
-"""
 
 
 @dataclass(frozen=True, eq=False)
