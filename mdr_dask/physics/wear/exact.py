@@ -20,7 +20,7 @@ from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, integral_along, march
 from mdr_dask.physics.wear.rules import limit, limit_radius
-from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
+from mdr_dask.physics.wear.slip import BORDER_WEIGHT, GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
     Scar,
     Worn,
@@ -60,6 +60,14 @@ class Resolution(NamedTuple):
     def step(self) -> float:
         """The error allowed in a step."""
         return 0.2 * self.accuracy * ROUGHER**self.rougher
+
+    @property
+    def flat(self) -> float:
+        """The rise (d - 1) / eta up to which the border is that of the virgin body, pressed to this depth.
+
+        The border of a steep body moves far during the first moments of wear.
+        """
+        return self.step / BORDER_WEIGHT
 
     def panels(self, near: int) -> Panels:
         """Return the panels for partial slip, which are halved `near` more times towards the stick border."""
@@ -189,7 +197,7 @@ def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
     """Return the contact after each wanted number of cycles; all are taken from the same solution."""
-    c = max(_moved(profile, stick_radius, resolution.step), stick_radius) if constant_force else stick_radius
+    c = max(_moved(profile, stick_radius, resolution.flat), stick_radius) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
         reach = farthest_contact(profile, c) if constant_force else 1.05 * limit_radius(profile, c)
@@ -222,7 +230,7 @@ def _fretted(
         leg = legs[0] if time <= legs[0].end else legs[-1]
         contacts[time] = _contact(leg, time)
         rise = (contacts[time].depth - 1.0) / problem.eta
-        if constant_force and rise < resolution.step:
+        if constant_force and rise < resolution.flat:
             border = max(_moved(profile, stick_radius, rise), stick_radius)
             least_errors = {**contacts[time].least_errors, "stick_border": border - stick_radius}
             contacts[time] = replace(contacts[time], stick_border=border, least_errors=least_errors)
