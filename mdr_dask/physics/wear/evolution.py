@@ -7,16 +7,15 @@ the position of the edge together.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import Factors, factorise
-from mdr_dask.physics.mdr.half_integrals import Panels
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.wear.slip import TOLERANCE, GrossSlip, Moment, PartialSlip
 
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
@@ -26,57 +25,12 @@ _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 MOST_STEPS = 20000  # a march with more steps fails: limit of computing time
 MOST_ITERATIONS = 12  # Newton iterations of one step; a step that is short enough needs about three
 GROWTH = 1.8  # largest ratio of a step to the previous step: formulas of order 3 need a bound to be stable
-TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # of Newton's method, and step of its finite differences
+
+Problem = PartialSlip | GrossSlip
 
 
 class NotConvergedError(ArithmeticError):
     """Raised if a time step fails even though it is very short."""
-
-
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """The contact at one `time`, which is the number of cycles N in partial slip and the sliding path s in gross slip.
-
-    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The next unknown is the
-    difference of r^2 between the edge and the inner border, divided by its value in the virgin contact. The other
-    unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
-    """
-
-    time: float
-    unknowns: FloatArray
-    accumulated: FloatArray
-
-
-class Problem(Protocol):
-    """The equations of one time step for one kind of slip (partial or gross)."""
-
-    @property
-    def panels(self) -> Panels:
-        """Return the panels between the inner border and the edge."""
-
-    def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether the unknowns describe a possible geometry, for example a contact of positive width."""
-
-    def admits(self, unknowns: FloatArray) -> bool:
-        """Return whether a solution of the equations is physically possible, within `TOLERANCE`."""
-
-    def start(self) -> Moment:
-        """Return the virgin contact."""
-
-    def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns that computes the contributions of the past moments to the residual."""
-
-    def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
-        """Return the moment at the end of a solved step."""
-
-    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return (accumulated quantity) - known - theta * rate at every node, then the residuals of other equations."""
-
-    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives of the residual with respect to the nodal unknowns."""
-
-    def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantity whose error is controlled in every step, in units of the largest possible wear."""
 
 
 def march(

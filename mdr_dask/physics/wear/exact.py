@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, integral_along, march
+from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, integral_along, march, settled
 from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import BORDER_WEIGHT, GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
@@ -217,7 +217,7 @@ def _fretted(
 
     legs, start, energy = [], None, 0.0
     if constant_force:
-        problem, start = problem.under_force()
+        problem, start = problem.under_force(settled(problem))
         moments = march(problem, np.inf if late else early[-1], resolution.step, first, start, stops)
         legs.append(_Leg(problem, moments))
         energy = legs[0].at(moments[-1].time)[1]

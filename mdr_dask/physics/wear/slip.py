@@ -20,12 +20,26 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import TOLERANCE, Moment, settled
 
+TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # of Newton's method, and step of its finite differences
 #: Weight of the stick border in the error of a step, relative to the weight of the depth: f rises like a square root
 #: beyond the border.
 BORDER_WEIGHT = 30.0
 _ABSCISSA, _WEIGHT = gauss(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The contact at one `time`, which is the number of cycles N in partial slip and the sliding path s in gross slip.
+
+    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The next unknown is the
+    difference of r^2 between the edge and the inner border, divided by its value in the virgin contact. The other
+    unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
+    """
+
+    time: float
+    unknowns: FloatArray
+    accumulated: FloatArray
 
 
 class VirginBody(NamedTuple):
@@ -154,9 +168,11 @@ class PartialSlip:
         y[:-1] = self.profile.rise(gap, c)[:-1] / self.eta
         return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.panels.nodes.size))
 
-    def under_force(self) -> tuple[PartialSlip, SlipMoment]:
-        """Return this problem with constant force instead of constant depth, and the first moment of that problem."""
-        virgin = settled(self)
+    def under_force(self, virgin: SlipMoment) -> tuple[PartialSlip, SlipMoment]:
+        """Return this problem with constant force instead of constant depth, and the first moment of that problem.
+
+        `virgin` is the virgin contact as a solution of the discrete equations.
+        """
         forced = replace(self, load=self.slipping_load(virgin.unknowns), border=None, frozen=np.nan)
         return forced, replace(virgin, unknowns=np.append(virgin.unknowns, [0.0, 0.0]))
 
