@@ -75,15 +75,22 @@ def settled(problem: Problem) -> Any:
 def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]:
     """Return the number of moments in the history that are earlier than `time`, and the moment at this time.
 
-    If the history contains no moment at this time, it is computed by an additional step.
+    If the history contains no moment at this time, it is computed by one or more additional steps.
     """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
-    moment, _ = _try_step(problem, _Newton(problem), history[:before], time)
-    if moment is None:
-        raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
-    return before, moment
+    newton, past, next_time = _Newton(problem), list(history[:before]), time
+    while past[-1].time < time:
+        moment, _ = _try_step(problem, newton, past, next_time)
+        if moment is not None:
+            past.append(moment)
+            next_time = time
+            continue
+        next_time = 0.5 * (past[-1].time + next_time)
+        if next_time == past[-1].time:
+            raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
+    return before, past[-1]
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
