@@ -176,4 +176,4 @@ def operations(block: Block[MixedLubrication]) -> float:
     lines = {tuple(str(block.columns[key][k]) for key in keys): points_of[k] for k in range(block.cases)}
     films = 10.0 * line_contact.operations(block.accuracy or line_contact.ACCURACY)
     solved = int(np.sum(block.column("film_formula") == "ehl"))
-    return films * solved + len(block.realisations) * (40.0 * sum(lines.values()) + of_cases)
+    return films * solved + len(block.realisations) * float(40.0 * sum(lines.values()) + of_cases)

@@ -66,7 +66,7 @@ def march(
 
 def settled(problem: Problem) -> Any:
     """Return the virgin contact as a solution of the discrete equations, so that the first step has no jump."""
-    virgin = problem.start()
+    virgin: Any = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem).solve(virgin.unknowns, 0.0, known)
     return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
@@ -104,7 +104,7 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
     return total
 
 
-def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time: float) -> tuple[Moment | None, float]:
+def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: float) -> tuple[Any, float]:
     """Return the moment after one step of the highest possible order, and the error of the step.
 
     If the step fails, the moment is None.
