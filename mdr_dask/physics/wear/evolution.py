@@ -20,8 +20,6 @@ from mdr_dask.physics.wear.slip import TOLERANCE, GrossSlip, Moment, PartialSlip
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
-
-
 MOST_STEPS = 20000  # a march with more steps fails: limit of computing time
 MOST_ITERATIONS = 12  # Newton iterations of one step; a step that is short enough needs about three
 GROWTH = 1.8  # largest ratio of a step to the previous step: formulas of order 3 need a bound to be stable
@@ -60,7 +58,7 @@ def march(
         change = 0.8 * (tolerance / max(error, 1e-300)) ** (1.0 / (min(len(history), 3) + 1))
         if moment is not None and error <= tolerance:
             history.append(moment)
-        step *= min(max(change, 0.2), GROWTH)
+        step *= min(max(0.2, change), GROWTH)
     return history
 
 
