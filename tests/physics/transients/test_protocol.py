@@ -102,6 +102,15 @@ def test_full_contact_is_exact(solid: Foundation) -> None:
     assert np.allclose(found.contact, 1)
 
 
+@pytest.mark.parametrize("deborah", [0.1, 10.0, 1e4])
+def test_the_mean_strain_of_a_term_is_the_mean_displacement_in_steady_sliding(deborah: float) -> None:
+    """The state repeats after each period, even if a term relaxes over many periods."""
+    height, slope = rough(32)
+    state, _, status = steady_start(periodic_line(height, slope), STANDARD, deborah, 0.3)
+    assert status == Outcome.CONVERGED
+    assert state.terms.mean() == pytest.approx(state.displacement.mean(), rel=5e-3)
+
+
 def test_contact_that_leaves_the_line_is_a_status() -> None:
     assert steady_start(bowl(100, 0.1), KELVIN, 0.05, 1.0)[2] == Outcome.OUTSIDE_LINE
     line = bowl(100)
