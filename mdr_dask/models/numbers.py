@@ -1,6 +1,9 @@
-"""List those parameters of a case that are numbers, under the names that they have in a store."""
+"""List parameters of a case under the names that they have in a store."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -22,3 +25,21 @@ def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float
         elif isinstance(value, int | float) and not isinstance(value, bool) and name not in idle:
             found[prefix + name] = (value, unit_of(type(parameters), name) or "1", field.description or "")
     return found
+
+
+def entries_of(axis: Mapping[str, Any]) -> dict[tuple[str, ...], list[Any]]:
+    """Return the parameters inside the values of a stored axis, such as the radius along an axis of indenters.
+
+    The key is the path of a parameter in the campaign; a value of the axis without this parameter has the entry None.
+    """
+    path = tuple(axis["path"].split("."))
+    each = [dict(_leaves(value, path)) if isinstance(value, dict) else {} for value in axis["values"]]
+    return {key: [one.get(key) for one in each] for key in dict.fromkeys(key for one in each for key in one)}
+
+
+def _leaves(value: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(inner, (*path, key))
+    elif isinstance(value, str | int | float):
+        yield path, value

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Iterable, Mapping
+from functools import lru_cache, reduce
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from mdr_dask import models
 from mdr_dask.aggregation import mean
+from mdr_dask.campaign.fields import unit_at
 from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Number, Status
-from mdr_dask.questions.expression import Value, evaluate, parse
+from mdr_dask.models.numbers import entries_of
+from mdr_dask.questions.expression import ALTERNATIVES, Find, Value, evaluate, parse
 
 #: Names of two columns: the state of a row, and the number of results in this row that are done.
 STATUS, REALISATIONS = "status", "realisations"
@@ -38,7 +41,34 @@ def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
     words = {str(name): str(value) for name, (value,) in flat.items() if isinstance(value, str | bool)}
-    return {name: word for name, word in words.items() if name not in dataset.coords}
+    return {name: word for name, word in words.items() if name not in dataset.coords and inner(dataset, name) is None}
+
+
+def inner(dataset: xr.Dataset, name: str) -> xr.DataArray | None:
+    """Return a parameter inside the values of an axis, such as ``indenter_radius`` along an axis of indenters.
+
+    Values of the axis without this parameter have NaN, or ``-`` if the parameter is a word. If no axis has such a
+    parameter, the result is None.
+    """
+    for axis in dataset.attrs.get("axes", []):
+        for path, entries in entries_of(axis).items() if axis["name"] in dataset.coords else ():
+            if "_".join(path) == name:
+                along, of = dataset[axis["name"]], dict(zip(axis["labels"], entries, strict=True))
+                found = [of[str(label)] for label in np.ravel(along.values)]
+                is_word = any(isinstance(value, str | bool) for value in entries)
+                words = np.array(["-" if value is None else str(value) for value in found], dtype=object)
+                array = (words if is_word else np.array(found, dtype=np.float64)).reshape(along.shape)
+                attrs = {} if is_word else {"units": _unit(dataset, axis, path)}
+                return xr.DataArray(array, along.coords, along.dims, attrs=attrs)
+    return None
+
+
+def _unit(dataset: xr.Dataset, axis: Mapping[str, Any], path: tuple[str, ...]) -> str:
+    """Return the SI unit of a parameter inside the values of an axis."""
+    kind = models.load(str(dataset.attrs.get("model"))).parameters
+    above = axis["path"].split(".")[::-1]
+    each = (reduce(lambda inside, key: {key: inside}, above, value) for value in axis["values"])
+    return next(filter(None, (unit_at(kind, path, data) for data in each)), "1")
 
 
 @lru_cache(maxsize=16)
@@ -89,16 +119,29 @@ class Columns:
         return DataError(f"no column {name!r}{hint}")
 
     def evaluate(self, text: str) -> Value:
-        """Return the value of a condition or a formula."""
+        """Return the value of a formula."""
+        return self._value(text, self.find)
+
+    def _with_states(self, name: str) -> xr.DataArray | None:
+        """Return a column for a condition. A row has the state ``failed`` if any of its results failed."""
+        found = self.find(name)
+        if name != STATUS or found is None:
+            return found
+        number = counts(self.dataset)
+        unfinished = [state for state in Status if state not in COMPLETE]
+        each = [xr.where(number.isel(state=state, drop=True) > 0, WORDS[state], "") for state in unfinished]
+        return xr.concat([found, *each], ALTERNATIVES, coords="minimal", compat="override")
+
+    def _value(self, text: str, find: Find) -> Value:
         expression = parse(text)
         for name in expression.names & self._numbers.keys():
             if self.find(name) is None:
                 raise self.unknown(name)
-        return evaluate(expression, self.find, self.known)
+        return evaluate(expression, find, self.known)
 
     def truth(self, condition: str) -> xr.DataArray:
         """Return an array that is true where a condition is met."""
-        found = xr.DataArray(self.evaluate(condition).array)
+        found = xr.DataArray(self._value(condition, self._with_states).array)
         if found.dtype != bool:
             raise DataError(f"{condition!r}: expected a comparison such as 'hurst < 0.7'")
         return found
@@ -109,6 +152,8 @@ class Columns:
             return states(data)
         if name == REALISATIONS:
             return counts(data).isel(state=Status.DONE)
+        if (entries := inner(data, name)) is not None:
+            return entries
         if name in data and name != COUNTS:
             array = data[name]
             has_realisations = name in data.data_vars and "realisation" in array.dims

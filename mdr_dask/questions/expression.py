@@ -29,6 +29,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 #: In conditions and selections, two numbers count as equal if their relative difference is at most `SAME`: users copy
 #: numbers from tables, which show six digits.
 SAME = 1e-5
+#: A word equals a column with this dimension if it equals one of the words along it.
+ALTERNATIVES = "alternatives"
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
 _PIECE = re.compile(r"\s*(\*\*|[*/^]|-?\d+|[^\W\d]\w*|[%°]\w*)")
@@ -240,7 +242,8 @@ class _Evaluation:
                     f"{self.text!r}: expected a comparison of words with words or of numbers with numbers, "
                     "got both kinds"
                 )
-            return first.array == second.array
+            same = first.array == second.array
+            return same.any(ALTERNATIVES) if ALTERNATIVES in getattr(same, "dims", ()) else same
         first, second = self._number(left), self._number(right)
         self._require_alike(first, second)
         return np.abs(first.array - second.array) <= SAME * np.abs(second.array)

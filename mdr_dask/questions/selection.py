@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.models.base import Status
-from mdr_dask.questions.columns import Columns, fixed_words
+from mdr_dask.questions.columns import Columns, fixed_words, inner
 from mdr_dask.questions.expression import SAME
-from mdr_dask.units import to_si
+from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,10 +33,11 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     fixed parameter. Both ends of a range are included. If a number is not a value of the axis, the nearest value is
     selected, and `tell` receives a message.
     """
+    units = written_units(str(dataset.attrs.get("campaign", "")))
     for text in selections:
         name, wanted = _parsed(text)
         axis = _axis(dataset, name)
-        kept = np.flatnonzero(_chosen(axis, name, wanted, tell))
+        kept = np.flatnonzero(_chosen(axis, name, wanted, units.get(name, ""), tell))
         if axis.dims[0] in dataset.dims:
             dataset = dataset.isel({axis.dims[0]: kept})
     return dataset
@@ -49,7 +52,7 @@ def select_all(
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
-        varied = [key for key, data in chosen.items() if name in data.dims or (name in data.coords and data[name].ndim)]
+        varied = [key for key, data in chosen.items() if _varies(data, name)]
         for key in varied or list(chosen)[:1]:
             chosen[key] = select(chosen[key], (text,), tell)
     return chosen
@@ -116,12 +119,19 @@ def _parsed(text: str) -> tuple[str, str]:
     return name, wanted
 
 
+def _varies(dataset: xr.Dataset, name: str) -> bool:
+    array = dataset[name] if name in dataset.coords else inner(dataset, name)
+    return name in dataset.dims or (array is not None and array.ndim > 0)
+
+
 def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return the values of an axis or parameter as a one-dimensional array. A fixed parameter has one value."""
     from xarray import DataArray
 
     if name in dataset.dims and name not in dataset.coords:
         return dataset[name].assign_attrs(units="1")
+    if (entries := inner(dataset, name)) is not None:
+        return entries if entries.ndim else entries.expand_dims("fixed")
     fixed = {key: coord for key, coord in dataset.coords.items() if coord.ndim == 0}
     fixed |= {key: DataArray(word) for key, word in fixed_words(dataset).items()}
     varied = [str(key) for key, coord in dataset.coords.items() if coord.ndim == 1]
@@ -135,24 +145,28 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
     raise DataError(f"no axis {name!r} in this study{hint or '; known: ' + ', '.join(known)}")
 
 
-def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return a mask of the values of an axis that a selection keeps."""
+def _chosen(axis: xr.DataArray, name: str, wanted: str, own: str, tell: Tell) -> NDArray[np.bool_]:
+    """Return a mask of the values of an axis that a selection keeps; messages have the unit `own` of the campaign."""
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
+    given = ~np.isnan(values)  # a parameter inside the values of an axis is not given for all of them
     unit = str(axis.attrs.get("units", "1"))
+    text = partial(shown, unit=unit, digits=6, written=own)
+    chosen, values = np.zeros(values.shape, dtype=bool), values[given]
     kept = np.zeros(values.shape, dtype=bool)
     for least, most in _intervals(wanted, name, unit):
         if least == most:
-            found = _nearest(values, least, name, unit, tell)
+            found = _nearest(values, least, name, text, tell)
         else:
             slack = SAME * np.abs(values)
             found = (values >= least - slack) & (values <= most + slack)
         if not found.any():
-            asked = written(least, unit) if least == most else f"{written(least, unit)} .. {written(most, unit)}"
-            raise DataError(f"no {name} {asked}: {_extent(values, unit)}")
+            asked = text(least) if least == most else f"{text(least)} .. {text(most)}"
+            raise DataError(f"no {name} {asked}: {_extent(values, text)}")
         kept |= found
-    return kept
+    chosen[given] = kept
+    return chosen
 
 
 def _chosen_words(labels: list[str], name: str, wanted: str) -> NDArray[np.bool_]:
@@ -177,7 +191,9 @@ def _words(text: str) -> list[str]:
     return [word.strip() for word in words]
 
 
-def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
+def _nearest(
+    values: NDArray[Any], wanted: float, name: str, text: Callable[[float], str], tell: Tell
+) -> NDArray[np.bool_]:
     """Return a mask of the value nearest to a number. If the number is outside the range of the axis, no value is
     selected.
     """
@@ -187,10 +203,7 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
         return np.zeros(values.shape, dtype=bool)
     nearest = values[np.argmin(distance)]
     if distance.min() > SAME * max(abs(wanted), abs(nearest)):
-        tell(
-            f"{name}: {written(wanted, unit)} is not a value of this axis; the nearest value is used: "
-            f"{written(nearest, unit)}"
-        )
+        tell(f"{name}: {text(wanted)} is not a value of this axis; the nearest value is used: {text(nearest)}")
     return np.asarray(values == nearest)
 
 
@@ -224,10 +237,10 @@ def _number(text: str, name: str, unit: str) -> float:
         raise DataError(f"{name}: {error}{hint}") from None
 
 
-def _extent(values: NDArray[Any], unit: str) -> str:
+def _extent(values: NDArray[Any], text: Callable[[float], str]) -> str:
     """Describe the values of an axis, for error messages."""
     if values.size == 1:
-        return f"it is {written(values[0], unit)} everywhere"
+        return f"its only value is {text(values[0])}"
     if values.size <= 6:
-        return f"its values are {', '.join(written(value, unit) for value in values)}"
-    return f"its values go from {written(values.min(), unit)} to {written(values.max(), unit)}"
+        return f"its values are {', '.join(map(text, values))}"
+    return f"its values go from {text(values.min())} to {text(values.max())}"

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
+from mdr_dask.models.numbers import entries_of
 from mdr_dask.store.files import bytes_of, group_name, read_json
 from mdr_dask.store.integrity import is_safe
 from mdr_dask.store.ledgers import require_undamaged
@@ -74,8 +75,10 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             and not dataset.indexes[dim].is_monotonic_increasing
         ):
             dataset = dataset.sortby(dim)
+    # the layout has the entries of the first value of a structured axis as if they were fixed
+    inner = {"_".join(path) for axis in dataset.attrs["axes"] for path in entries_of(axis)}
     order = [*dataset.attrs["outputs"], "status"]
-    return dataset[order]
+    return dataset[order].drop_vars(inner & dataset.coords.keys())
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

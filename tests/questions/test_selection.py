@@ -5,7 +5,10 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from test_execute import run
 
+from mdr_dask import plot, store, table
+from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
 from mdr_dask.questions.selection import group, outputs, select, select_all
 
@@ -79,7 +82,7 @@ def test_an_end_of_an_axis_is_its_own_but_for_rounding(study, factor, kept):
     if kept:
         assert select(micro, [f"velocity={1e6 * factor!r}"], silent).velocity == 1e6
     else:
-        with pytest.raises(DataError, match=r"no velocity 1.00002e\+06 m/s: its values are"):
+        with pytest.raises(DataError, match=r"no velocity 1\.00002 Mm/s: its values are"):
             select(micro, [f"velocity={1e6 * factor!r}"], silent)
 
 
@@ -90,7 +93,7 @@ def test_cases_of_a_sampled_study_are_selected_by_number_and_by_column(sampled):
 
 
 REFUSED = [
-    ("velocity=2 m/s", "no velocity 2 m/s: its values are 0.001 m/s, 0.01 m/s, 0.1 m/s, 1 m/s"),
+    ("velocity=2 m/s", "no velocity 2 m/s: its values are 1 mm/s, 10 mm/s, 100 mm/s, 1 m/s"),
     ("velocity=2..3", "no velocity 2 m/s .. 3 m/s: its values"),
     ("velocity=1..10 mm/s", "velocity: expected a unit after every number or after none, got '1..10 mm/s'"),
     ("velocity=1 N", "velocity: expected a velocity (such as '1 mm/s'), got '1 N'"),
@@ -135,5 +138,50 @@ def test_a_number_that_is_none_of_the_axis_is_told(study, wanted, silently):
     told = []
     assert select(study, [f"velocity={wanted}"], told.append)["velocity"].values.tolist() == [0.1]
     assert told == (
-        [] if silently else ["velocity: 0.1004 m/s is not a value of this axis; the nearest value is used: 0.1 m/s"]
+        [] if silently else ["velocity: 100.4 mm/s is not a value of this axis; the nearest value is used: 100 mm/s"]
     )
+
+
+def test_messages_have_the_unit_of_the_campaign(study):
+    study.attrs["campaign"] = "parameters: {velocity: {geometric: [0.1 cm/s, 100 cm/s, 4]}}"
+    told = []
+    select(study, ["velocity=11 mm/s"], told.append)
+    assert "1.1 cm/s" in told[0]
+    with pytest.raises(DataError, match="no velocity 200 cm/s"):
+        select(study, ["velocity=2 m/s"], silent)
+
+
+@pytest.fixture(scope="module")
+def bodies(tmp_path_factory):
+    """A study with an axis of structures."""
+    wear = "contact_modulus: 1 GPa, effective_shear_modulus: 1 GPa, friction: 1, amplitude: 0.1 um"
+    more = "depth: 1 um, hardness: 1 GPa, wear_coefficient: 1e-4, wear_rule: limit"
+    listed = "[{shape: parabola, radius: 1 cm}, {shape: cone, angle: 1 deg}, {shape: cone, angle: 2 deg}]"
+    text = f"name: b\nmodel: fretting_wear\nparameters: {{{wear}, {more}, indenter: {listed}}}\n"
+    url = str(tmp_path_factory.mktemp("bodies") / "b.zarr")
+    run(loads(text, "", "."), url)
+    return store.datasets(url)[""]
+
+
+INSIDE = [
+    ("indenter.shape=cone", "indenter_shape == cone", [1, 2]),
+    ("indenter.shape=parabola", "indenter_shape == parabola", [0]),
+    ("indenter.angle=2 deg", "indenter.angle > 1.5 deg", [2]),
+]
+
+
+@pytest.mark.parametrize(("selection", "condition", "kept"), INSIDE, ids=[text for text, _, _ in INSIDE])
+def test_parameters_inside_an_axis_belong_to_its_values(bodies, selection, condition, kept):
+    expected = bodies.isel(indenter=kept)
+    xr.testing.assert_identical(select(bodies, [selection], silent), expected)
+    xr.testing.assert_identical(select_all({"": bodies}, [selection], silent)[""], expected)
+    assert table(bodies, where=condition)["indenter"].tolist() == expected["indenter"].values.tolist()
+    if kept != [0]:
+        with pytest.raises(DataError, match="indenter_angle 3 deg: its only value"):
+            select(bodies.isel(indenter=kept[-1:]), ["indenter.angle=3 deg"], silent)
+
+
+def test_parameters_inside_an_axis_are_not_fixed(bodies):
+    assert not [name for name in bodies.coords if name.startswith("indenter_")]
+    drawn = plot(bodies, "wear_volume", over="indenter")
+    assert not any("indenter_" in line for line in drawn.description.head({}))

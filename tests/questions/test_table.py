@@ -112,6 +112,23 @@ def test_conditions_on_outputs_axes_and_numbers(study):
     assert masked.trace.attrs == study.trace.attrs
 
 
+STATES = [
+    ("status == failed", [1, 2]),
+    ("status != failed", [0, *range(3, 12)]),
+    ("status in (missing, failed)", [0, 1, 2]),
+    ("status == '6 failed'", [1]),
+    ("status == done", [*range(3, 12)]),
+]
+
+
+@pytest.mark.parametrize(("where", "kept"), STATES)
+def test_a_row_of_means_has_the_states_of_its_results(study, where, kept):
+    every = rows(study)
+    pd.testing.assert_frame_equal(rows(study, where=where), every.iloc[kept].reset_index(drop=True))
+    one = study.isel(normal_force=0, velocity=1)
+    assert len(rows(one, where=where)) == (1 in kept)
+
+
 def test_columns_in_their_order_and_their_units(study):
     columns = ("velocity", "scheme", "velocity_number", "scaled_friction", "length", "status")
     found = rows(study, columns=columns, units={"velocity": "km/h", "length": "mm"})
