@@ -30,9 +30,6 @@ PATH, STEPS = 1.5, 3
 DIFFERENCE = 1e-3
 """Step of the finite differences of the gradient, in standard deviations of the prior."""
 
-STIFFNESSES = (0.0, 3.0, 6.0)
-"""Natural logarithms of the factors by which the prior bend is divided in a first guess."""
-
 SCAN = 81
 """Number of steps tried for each pair of neighbouring curves."""
 
@@ -52,19 +49,13 @@ def first_guess(curves: Curves) -> FloatArray:
         begin = np.array([x[member == 0].min(), x[member == 1].min()])
         aligned = x - begin[member]
         two = replace(curves, x=aligned, y=curves.y[:, pair], member=member, count=2, splines=3 * CELLS + 3)
-        width = float(np.ptp(aligned))
-        middle = two.prior[0]
-        energies = []
-        for stiffness in STIFFNESSES:
-            rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
-            rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
-            channels = curves.y.shape[0]
-            # the best step may lie between two tried steps; the noise is at least as large as the resulting error of y
-            coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
-            noise = slice(1 + 2 * channels, 1 + 3 * channels)
-            rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
-            energies.append(solve(two, rows).energy)
-        share = softmax(-np.min(energies, axis=0))
+        width, channels = float(np.ptp(aligned)), curves.y.shape[0]
+        rows = np.column_stack([steps * width, np.tile(two.prior[0][1:], (SCAN, 1))])
+        # the best step may lie between two tried steps; the noise is at least as large as the resulting error of y
+        coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
+        noise = slice(1 + 2 * channels, 1 + 3 * channels)
+        rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
+        share = softmax(-solve(two, rows).energy)
         mean = float(share @ rows[:, 0])
         means.append(mean + begin[0] - begin[1])
         variances.append(float(share @ (rows[:, 0] - mean) ** 2) + (steps[1] - steps[0]) ** 2)
