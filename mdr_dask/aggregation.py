@@ -16,8 +16,6 @@ from mdr_dask import bootstrap
 from mdr_dask.errors import DataError, did_you_mean
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-#: Largest number of resampled means that are held in memory at once.
-_STEP = 2**20
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
-    step = max(1, _STEP // bootstrap.RESAMPLES)
+    step = 2**20 // bootstrap.RESAMPLES  # limits the memory for resampled means
     for start in range(0, len(flat), step):
         rows = flat[start : start + step].T
         stack = bootstrap.means(rows[:count])

@@ -28,8 +28,6 @@ SMOOTH = 0.6
 LEVELS = 16
 #: Number of possible sizes of an unknown measurement error.
 DEVIATIONS = 14
-#: Largest number of elements of an array in the likelihood.
-_STEP = 2**21
 
 
 class Noise(NamedTuple):
@@ -65,7 +63,7 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
                 found.append(prior - 0.5 * (square + determinant))
         return np.stack(found, axis=1)
 
-    step = max(1, _STEP // (8 * values.size))
+    step = max(1, 2**18 // values.size)  # limits the memory for the likelihood
     return lambda places: np.concatenate([of(places[k : k + step]) for k in range(0, len(places), step)])
 
 

@@ -34,7 +34,6 @@ from mdr_dask.fits.jumps import LAW, LEVELS, MODELS, each_jump, jump_law, jumps_
 
 WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
 FLOOR = 0.01  # assumed grid error of mu - mu_2, as a fraction of the largest mu - mu_2 (docs/kinetics.md)
-GRID = 400  # number of rates that are tried, evenly spaced on a logarithmic scale
 
 TRUSTED = 0.5  # the fit of the power law uses a rate if the half width of the interval of ln(rate) is below this value
 SURE = 0.1  # the fit of the power law has weights 1 / (error of ln(rate)^2 + SURE^2), so that no single rate dominates
@@ -76,14 +75,14 @@ def widths(time: FloatArray) -> FloatArray:
 
 def tried_rates(time: FloatArray) -> FloatArray:
     """Return the rates that are tried for a trace; the times of the trace do not resolve lower or higher rates."""
-    rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
+    rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], 400)
     return rates
 
 
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each trace, shape (n, m), by weighted least squares; return rates and amplitudes.
 
-    `GRID` rates are tried, each with its best amplitude. A parabola through the sums of squares at the best rate and
+    Each of the `tried_rates` has its own best amplitude. A parabola through the sums of squares at the best rate and
     at its two neighbours refines the rate to a relative error of about 1e-4.
     """
     logs = np.log(tried_rates(time))

@@ -15,8 +15,6 @@ from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.physics.superposition.posterior import STEP_SCATTER, Curves, solve
 from mdr_dask.physics.superposition.sampling import draws
 
-CURVE_POINTS = 201  # of the merged curve
-
 EXPANSION = 6e-4
 """Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
 
@@ -218,7 +216,7 @@ def _merged(
     shifts = np.concatenate([np.zeros((len(rows), 1)), rows[:, :lines]], axis=1)
     mean = shifts.mean(axis=0)
     x = problem.x + mean[problem.member]
-    grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
+    grid = np.linspace(x.min(), x.max(), 201)
     parts = np.array_split(rows, max(len(rows) // 50, 1))
     unknowns = np.concatenate([solve(problem, part).unknowns(generator) for part in parts])
     offsets = unknowns[:, -count:] if problem.offset else np.zeros((len(rows), count))

@@ -30,9 +30,6 @@ PATH, STEPS = 1.5, 3
 DIFFERENCE = 1e-3
 """Step of the finite differences of the gradient, in standard deviations of the prior."""
 
-SCAN = 81
-"""Number of steps tried for each pair of neighbouring curves."""
-
 
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
@@ -41,7 +38,7 @@ def first_guess(curves: Curves) -> FloatArray:
     weighted with the density of the pair, give the mean and the variance of the step. Both are then combined with the
     prior of the shifts.
     """
-    steps = np.linspace(-2.0, 2.0, SCAN)
+    steps = np.linspace(-2.0, 2.0, 81)  # in widths of the wider of the two curves
     means, variances = [], []
     for k in range(curves.count - 1):
         pair = (curves.member == k) | (curves.member == k + 1)
@@ -50,7 +47,7 @@ def first_guess(curves: Curves) -> FloatArray:
         aligned = x - begin[member]
         two = replace(curves, x=aligned, y=curves.y[:, pair], member=member, count=2, splines=3 * CELLS + 3)
         width, channels = float(np.ptp(aligned)), curves.y.shape[0]
-        rows = np.column_stack([steps * width, np.tile(two.prior[0][1:], (SCAN, 1))])
+        rows = np.column_stack([steps * width, np.tile(two.prior[0][1:], (steps.size, 1))])
         # the best step may lie between two tried steps; the noise is at least as large as the resulting error of y
         coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
         noise = slice(1 + 2 * channels, 1 + 3 * channels)
