@@ -326,9 +326,11 @@ def solve_film(
     found = refine(
         solve, 1, NODES[1:], accuracy, ORDER, floors=[0.0, *(floors or np.zeros(len(readings)))], shared=False
     )
-    error = found.errors[0, 0] / np.max(found.values[0])
-    if found.outcome[0] != Outcome.CONVERGED or not np.isfinite(error):
-        return _no_solution(case, Outcome(int(found.outcome[0])), solved[-1] if solved else source)
+    error, outcome = found.errors[0, 0] / np.max(found.values[0]), Outcome(int(found.outcome[0]))
+    if outcome == Outcome.CONVERGED and not np.isfinite(error):
+        outcome = Outcome.UNDER_WAY  # too few grids have a solution
+    if outcome != Outcome.CONVERGED:
+        return _no_solution(case, outcome, solved[-1] if solved else source)
     central, minimum = (Estimate(film, error * film) for film in found.values[0][0] * scales)
     return LineSolution(case, Outcome.CONVERGED, "", tuple(solved), central, minimum)
 
@@ -344,6 +346,5 @@ def operations(accuracy: float) -> float:
 
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution) -> LineSolution:
-    why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
-    reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g} on {failed.nodes.size} nodes: {why}"
+    reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g} on {failed.nodes.size} nodes: {outcome.sentence}"
     return LineSolution(case, outcome, reason, (), NO_ESTIMATE, NO_ESTIMATE)

@@ -23,7 +23,9 @@ from mdr_dask.physics.outcome import Outcome
 _FILM_SHARE = 0.8  # one step may reduce the film at a node by at most this fraction
 _LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
 _SHRINKS = 0.1  # a factorised Jacobian is reused while steps shrink at least by this factor
-_TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # relative size of the last step
+#: Relative size of the last step; the remaining error is about its square. After a step with a reused Jacobian, the
+#: remaining error is larger, so the size must be a hundred times smaller.
+_TOLERANCE = 1e-4
 
 
 class Grid(NamedTuple):
@@ -336,23 +338,24 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
     solved, factors, b = listed[:0], None, np.empty(0)
-    size, before = np.inf, 1.0
+    size, before, last = np.inf, 1.0, _TOLERANCE
     for steps in range(pace.most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
         # at least two steps are taken, because the first step may be small by chance
-        if steps > 1 and size < _TOLERANCE and same:
+        if steps > 1 and size < last and same:
             return Iterate(Outcome.CONVERGED, P, central, H)
         if steps == pace.most:
             break
         if same and size < _SHRINKS * before:
             _fill_imbalance(grid, P, found.value, active, b)
+            last = 0.01 * _TOLERANCE
         else:
             solved, b = active.copy(), np.empty(active.size + 1)
             A = workspace[: b.size**2].reshape(b.size, b.size)
             _fill_equations(grid, P, found, active, A, b)
-            factors = factorise(A)
+            factors, last = factorise(A), _TOLERANCE
         if factors is None:
             return Iterate(Outcome.SINGULAR, P, central, H)
         solution = factors.solve(b)
