@@ -20,6 +20,7 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
+_QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; the rest is linear upwind
 _FILM_SHARE = 0.8  # one step may reduce the film at a node by at most this fraction
 _LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
 _SHRINKS = 0.1  # a factorised Jacobian is reused while steps shrink at least by this factor
@@ -120,14 +121,18 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     """Return the weights of the nodes f-1, f and f+1 in an interpolated value halfway between f and f+1.
 
-    The interpolation is quadratic (QUICK). The liquid flows from node f to node f+1.
+    The liquid flows from node f to node f+1. The value is a weighted mean of a quadratic interpolation and of a
+    linear extrapolation from upstream (see `_QUADRATIC`).
     """
     if f == 0:
         return 0.0, 0.5, 0.5
     dx = nodes[f + 1] - nodes[f]
     upstream = nodes[f] - nodes[f - 1]
-    w0 = -dx * dx / (4.0 * upstream * (upstream + dx))
-    w2 = (0.5 * dx + upstream) / (2.0 * (upstream + dx))
+    first = -dx * dx / (4.0 * upstream * (upstream + dx))
+    last = (0.5 * dx + upstream) / (2.0 * (upstream + dx))
+    linear = -0.5 * dx / upstream
+    w0 = linear + _QUADRATIC * (first - linear)
+    w2 = _QUADRATIC * last
     return w0, 1.0 - w0 - w2, w2
 
 

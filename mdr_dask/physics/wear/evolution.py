@@ -78,6 +78,8 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
+    if time < np.finfo(np.float64).tiny:  # 1 / time would overflow
+        return 0, history[0]
     newton, past, next_time = _Newton(problem), list(history[:before]), time
     while past[-1].time < time:
         moment, _ = _try_step(problem, newton, past, next_time)

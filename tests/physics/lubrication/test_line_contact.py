@@ -101,7 +101,7 @@ def _heavy() -> Iterator[tuple[LineContact, float, float]]:
 
 
 def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy() -> None:
-    """70 random points with M > 200 against grids of 10241 nodes: 97 % within the error, all within the accuracy."""
+    """70 random points with M > 200 against grids of 10241 nodes: 98 % within the error, 99 % within the accuracy."""
     accuracy = 1e-2
     errors, stated = [], []
     for case, central, minimum in _heavy():
@@ -112,7 +112,7 @@ def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy() -> None:
             errors.append(abs(float(here.value) / true - 1))
             stated.append(float(here.error) / true + 5e-6)
     assert np.mean(np.array(errors) <= accuracy) >= 0.99
-    assert np.mean(np.array(errors) <= np.array(stated)) >= 0.95
+    assert np.mean(np.array(errors) <= np.array(stated)) >= 0.98
     assert np.max(np.array(errors) / np.array(stated)) < 3
 
 
