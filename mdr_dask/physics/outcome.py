@@ -12,12 +12,11 @@ class Outcome(IntEnum):
     DEPTH_NOT_FOUND = 1
     OUTSIDE_LINE = 2
     INVALID = 3
-    NOT_STEADY = 4
-    TOO_MANY_STEPS = 5
-    SINGULAR = 6
-    FILM_COLLAPSED = 7
-    STEP_TOO_SMALL = 8
-    UNDER_WAY = 9
+    TOO_MANY_STEPS = 4
+    SINGULAR = 5
+    FILM_COLLAPSED = 6
+    STEP_TOO_SMALL = 7
+    UNDER_WAY = 8
 
     @property
     def sentence(self) -> str:
@@ -35,7 +34,6 @@ _SENTENCES = {
     Outcome.DEPTH_NOT_FOUND: "the depth at which the contact carries the load was not found",
     Outcome.OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
     Outcome.INVALID: "load, velocity and line must be finite, the load and the Deborah number positive",
-    Outcome.NOT_STEADY: "friction did not reach the steady state at the new velocity",
     Outcome.TOO_MANY_STEPS: "too many steps were needed",
     Outcome.SINGULAR: "the linear equations of a step have no solution",
     Outcome.FILM_COLLAPSED: "the next step would have closed the film",

@@ -12,7 +12,7 @@ from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.contact_search import Workspace, find_contact
 from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
-from mdr_dask.physics.transients.march import Finish, Marching, Trajectory, march_depth
+from mdr_dask.physics.transients.march import Marching, Trajectory
 from mdr_dask.physics.transients.patches import LOAD, History
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation
 
@@ -64,22 +64,11 @@ def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampl
     return float((force * touches).sum() / SAMPLES), float(doubt)
 
 
-def marched(relaxation) -> tuple[Marching, Trajectory, Workspace, int]:
-    """March a case of `velocity_jump` to its end; return problem, trajectory, workspace and number of moments."""
-    for interval in relaxation.intervals:
-        marching, found, work = relaxation.begun(interval)
-        finish = Finish(relaxation.ends[1], relaxation.limits.after, 1e-9, 1e-9)
-        count, outcome = march_depth(marching, relaxation.stepping, finish, found, work)
-        if outcome >= 0:
-            break
-    return marching, found, work, count
-
-
 def searched_afresh(marching: Marching, found: Trajectory, now: int, work: Workspace) -> int:
-    """Search the contact at a moment of a march without bounds from earlier moments; return the number of patches."""
+    """Search the contact at a moment of a march in all cells; return the number of patches."""
     time = found.time[now]
     history = History(found.time, found.depth, found.rate, now + 1, 0.0)
-    work.skip.skip_until.fill(-np.inf)
+    work.free_until.fill(-np.inf)
     instant = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
     return find_contact(instant, marching.reachable, work)
 
@@ -89,9 +78,11 @@ def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> fl
 
     The uncertainty of the sampling is subtracted; NaN if no moment could be judged.
     """
-    marching, found, work, count = marched(relaxation)
+    marching, found, work, outcome = relaxation.march()
+    if outcome != Outcome.CONVERGED:
+        return np.nan
     line, worst = sampled(marching), np.nan
-    for now in generator.permutation(np.arange(1, count))[:moments]:
+    for now in generator.permutation(np.arange(1, found.time.size))[:moments]:
         travel, patches = marching.deborah * found.time[now], searched_afresh(marching, found, now, work)
         if patches < 0 or travel > 1.2 * marching.track.cells:
             continue

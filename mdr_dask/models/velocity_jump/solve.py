@@ -45,8 +45,6 @@ ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the 
 # The operations of a jump are OPERATIONS_MARCHED times nodes times steps per decade. The operations of a history are
 # OPERATIONS_FOLLOWED times nodes squared.
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
-FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
-HISTORY_ORDER = 2  # order at which a history converges when cell size and time step decrease together
 
 #: Names of the outputs for which errors are estimated.
 WITH_ERROR = (
@@ -240,7 +238,7 @@ class _Followed(_Group):
             return Solution(values, np.array([found.outcome], np.int8))
 
         # if a depth is below the rms height, which is 1 here, its error is divided by the rms height
-        refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
+        refined = refine(solve, 1, grids, 0.0, order=2, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
         before, at = friction[:, 0], friction[:, 1]
@@ -276,7 +274,8 @@ def _check_rough(roughness: Roughness) -> None:
     """Raise DataError for a measured line that is flat."""
     if isinstance(roughness, Measured):
         height = line_of(roughness.profile).height
-        if not height.std() > FLAT * float(np.max(np.abs(height), initial=0.0)):
+        rounding = height.size * np.finfo(float).eps * float(np.max(np.abs(height), initial=0.0))
+        if not height.std() > rounding:
             raise DataError(f"expected a rough line, got the flat profile {roughness.profile.file.name}")
 
 

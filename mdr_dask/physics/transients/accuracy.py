@@ -22,10 +22,6 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, stead
 from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between
 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
-ORDER = 2  # lower bound of the order of convergence of the steady states
-CAUTION = 2 * SAFETY  # safety factor for errors of steady states; a contact of a few nodes converges irregularly
-# safety factor for the error of a transient, which converges at first order because single asperities enter contact
-TRANSIENT = SAFETY
 
 
 class Levels(NamedTuple):
@@ -101,7 +97,8 @@ def solve_jumps(
     while accuracy is not None and (grids[-1] < grid or 2 * grids[-1] <= FINEST):
         grids.append(2 * grids[-1])
     floors = [0.0, 0.0, 0.0, 1.0]
-    refined = refine(solve, cases, grids, accuracy or np.inf, ORDER, safety=CAUTION, floors=floors)
+    # a contact of a few nodes converges irregularly, at second order or faster; the safety factor is therefore doubled
+    refined = refine(solve, cases, grids, accuracy or np.inf, order=2, safety=2 * SAFETY, floors=floors)
     levels = Levels(*refined.values)
     errors = Levels(*refined.errors if accuracy is not None else np.full((4, cases), np.nan))
     shape = cases, march.times.size if march else 0
@@ -122,7 +119,8 @@ def solve_jumps(
             if jump.path is not None:
                 coarse = limits[grid // 2, int(k)]
                 other = jump_between(lines[grid // 2], loads[k], deborah[k], coarse, half).path
-                error = TRANSIENT * _change(jump.path, fine, other, coarse, march.times)
+                # a transient converges at first order, because single asperities enter contact
+                error = SAFETY * _change(jump.path, fine, other, coarse, march.times)
             trace_error[k], depth_error[k] = error + np.array([[errors.after[k]], [errors.depth[k]]])
     return jumps
 

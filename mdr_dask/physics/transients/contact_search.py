@@ -23,7 +23,7 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_recovery import (
-    MARGIN,
+    ROUNDING,
     WINDOW,
     WINDOWS,
     FreeRecovery,
@@ -59,15 +59,10 @@ from mdr_dask.physics.transients.patches import (
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
-ROUNDING = 1e-9  # margin for rounding errors, relative to a displacement
-CLOSE = 1e-9  # largest last interval of the bisection for the place where contact ends, as a fraction of a cell
-FULL = -1  # returned if the arrays are too small for all patches, or if a patch extends beyond its run of cells
-DEPTH_CHANGES = 4.0  # assumed largest derivative of a displacement with respect to the last depth
+LEFT_LIMITS = -1  # outcome if a patch extends beyond its run of cells, or if there are too many patches
 
 # Entries of `Workspace.scan`, the state of the search
 BEGIN, FREE_FROM, HELD, FIRM_LIFT, FIRM_UNTIL, LOWEST = range(6)
-# Entries of `SkipBounds.state`
-APPROACH, LARGEST, TIME, DEPTH, DRIFT = range(5)
 
 
 class Reachable(NamedTuple):
@@ -81,24 +76,14 @@ class Reachable(NamedTuple):
     second: float
 
 
-class SkipBounds(NamedTuple):
-    """A cell without contact can be skipped until the approach (see `_skip_free`) reaches `skip_until` of the cell.
-
-    The entries of `state` are: the approach so far, the largest entry of `skip_until`, and time, depth and largest
-    drift at the last search.
-    """
-
-    skip_until: FloatArray
-    state: FloatArray
-
-
 class Workspace(NamedTuple):
     """Work arrays of a search, and the results: the patches, and the sums over the patches with their derivatives.
 
     The entries of `scan` are: place where the current patch begins; place where contact or a positive force last ended;
     place up to which contact is certain; a limit (cells in contact with a barrier below this limit can be skipped);
     place up to which this limit is valid; and least displacement of free elements at the end of the previous cell. The
-    barriers of the cells belong to the Deborah number after the jump.
+    barriers of the cells belong to the Deborah number after the jump. `free_until` contains, for each cell, the largest
+    depth at which the cell is certainly out of contact.
     """
 
     start: FloatArray
@@ -106,22 +91,17 @@ class Workspace(NamedTuple):
     sums: FloatArray
     scan: FloatArray
     recovery: FreeRecovery
-    skip: SkipBounds
     barriers: Barriers
+    free_until: FloatArray
 
 
-def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Workspace:
-    """Return a workspace that has space for 4 `patches` + 4096 patches.
-
-    For each cell, `below` is the increase of the depth since the jump up to which the cell stays out of contact.
-    """
+def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> Workspace:
+    """Return a workspace that has space for 4 `patches` + 4096 patches."""
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
     earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
     recovery = FreeRecovery(earliest, place, farthest, barrier, np.zeros(1, np.int64), bounds)
-    state = np.zeros(5)
-    state[TIME] = np.nan
-    return Workspace(start, end, np.zeros(SUMS), np.empty(6), recovery, SkipBounds(below, state), barriers)
+    return Workspace(start, end, np.zeros(SUMS), np.empty(6), recovery, barriers, free_until)
 
 
 class Motion(NamedTuple):
@@ -170,7 +150,7 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at the last instant of the history; return their number, or `FULL`.
+    """Find the contact patches at the last instant of the history; return their number, or `LEFT_LIMITS`.
 
     The runs must contain all patches at this depth. The patches and their `sums` are written to the workspace. The sums
     are: load and drag, divided by 4 G dx; length in contact; integral of the slope over the length in contact;
@@ -180,14 +160,12 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     last, recovery = now.history.count - 1, work.recovery
     motion = _motion_until(now, reachable.second)
     write_bounds(now.history, now.first, now.deborah, recovery.bounds)
-    _add_approach(now, recovery.bounds, work.skip.state)
     depth = now.history.depth[last]
     lift = depth + now.history.rate[last]
     search = Search(now, motion, work, depth, lift, int(now.track.cells))
     recovery.count[0] = 0
     found = _search_period(search, reachable.runs)
     if motion.passes_top:
-        work.skip.state[TIME] = np.nan  # bounds found in a repeated search are invalid at the next instant
         for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, PERIODS)):
             for k in range(recovery.count[0]):  # now the places of separation belong to the previous period
                 recovery.earliest[k] -= now.track.cells
@@ -211,13 +189,13 @@ def _motion_until(now: Instant, second: float) -> Motion:
     lift, rise, fall, passes_top = depth + rate, 0.0, 0.0, False
     deepest, highest = depth, lift
     carried, before, lift_before = -np.inf, 0.0, history.depth[0] + history.rate[0]
-    for moment in range(last + 1):
-        time, then = history.time[moment], history.depth[moment]
-        lift_then = then + history.rate[moment]
+    for instant in range(last + 1):
+        time, then = history.time[instant], history.depth[instant]
+        lift_then = then + history.rate[instant]
         deepest, highest = max(deepest, then), max(highest, lift_then)
-        if moment < last:
+        if instant < last:
             rise = max(rise, (lift - lift_then) / (now.time - time))
-        if moment > 0:
+        if instant > 0:
             fall = max(fall, (lift_before - lift_then) / (time - before))
             carried *= np.exp(before - time)
         passes_top |= carried > then and deborah * (now.time - time) < now.track.cells
@@ -229,29 +207,9 @@ def _motion_until(now: Instant, second: float) -> Motion:
     return Motion(rise, fall, deepest, highest, passes_top)
 
 
-@jit_inline_uncounted
-def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
-    """Increase the approach (see `_skip_free`) by its largest possible change since the last search.
-
-    If the last search was neither at this instant nor at the previous instant of the history, no cell is skipped any
-    longer.
-    """
-    history, last = now.history, now.history.count - 1
-    depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
-    if now.time == state[TIME]:  # the last search was at the same instant, with another guess of the depth
-        state[APPROACH] += DEPTH_CHANGES * abs(depth - state[DEPTH])
-    elif last > 0 and history.time[last - 1] == state[TIME]:
-        before = history.depth[last - 1]
-        nearer = depth - before + (now.time - state[TIME]) * max(drift, state[DRIFT])
-        state[APPROACH] += DEPTH_CHANGES * abs(before - state[DEPTH]) + max(nearer, 0.0)
-    else:
-        state[APPROACH] = state[LARGEST] + max(depth - history.depth[0], 0.0)
-    state[TIME], state[DEPTH], state[DRIFT] = now.time, depth, drift
-
-
 @jit_uncounted
 def _search_period(search: Search, runs: IntArray) -> int:
-    """Search one period of the line; return the number of patches, or `FULL`.
+    """Search one period of the line; return the number of patches, or `LEFT_LIMITS`.
 
     The places of separation that are stored in the workspace at the start belong to the previous period. Without such
     places, only elements that have been free since before the jump can pass the highest point out of contact.
@@ -274,10 +232,10 @@ def _search_period(search: Search, runs: IntArray) -> int:
                 break
             contact, found = _examine(search, i, contact, found)
             if found < 0:
-                return FULL
+                return LEFT_LIMITS
             i += 1
         if contact and run + 1 < runs.shape[0]:
-            return FULL
+            return LEFT_LIMITS
     finish = track.cells + origin
     begin = scan[BEGIN] if contact else finish
     add_patch(track, begin, finish, lift, now.deborah, sums)
@@ -328,18 +286,16 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
     The displacement of free elements has a lower bound, computed along the line from the last known displacement and
     the least drift. Here the *gap* is this bound minus the largest depth + h in the cell. If the gap is too wide to
-    have opened since the elements separated, there was a gap all the time; the cell is then skipped until the line has
-    approached the elements by the width of the gap. The rate at which the gap closes is at most the rate of the depth
-    plus the largest drift. The *approach* is the integral of this upper limit over time.
+    have opened since the elements separated, there was a gap all the time, and the cell is skipped.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
-    track, bounds, skip, lift = now.track, work.recovery.bounds, work.skip, search.lift
-    approach, oldest = skip.state[APPROACH], _oldest(work.recovery, scan[FREE_FROM])
+    track, bounds, lift = now.track, work.recovery.bounds, search.lift
+    oldest = _oldest(work.recovery, scan[FREE_FROM])
     drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
     lowest = scan[LOWEST]
     while i < stop:
         lowest = (lowest - drift) * fade + drift
-        may_begin = approach >= skip.skip_until[np.uintp(i)]
+        may_begin = search.depth > work.free_until[np.uintp(i)]
         if may_begin and not _stays_free(search, i, lowest - search.depth - track.peak[np.uintp(i)], oldest):
             pressed = i >= search.n or keeps_pressed(track, barriers, now.deborah, i, lift)
             if pressed or lift > barriers.idle[np.uintp(i)]:
@@ -353,28 +309,22 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
     """Return whether the elements in a cell certainly had a gap to the line all the time, so that they stay free.
 
-    Such a cell is skipped until the line has approached the elements by the given gap. The free elements in the cell
-    separated at the place `oldest` or further along the line.
+    The free elements in the cell separated at the place `oldest` or further along the line.
     """
-    skip, opened = search.work.skip, search.work.recovery.bounds.opened
-    if not (gap > 0 and gap > opened[window(2 * (cell + 1 - oldest) + MARGIN)]):
-        return False
-    until = skip.state[APPROACH] + gap
-    skip.skip_until[np.uintp(cell)] = until
-    skip.state[LARGEST] = max(skip.state[LARGEST], until)
-    return True
+    opened = search.work.recovery.bounds.opened
+    return gap > 0 and gap > opened[window(2 * (cell + 1 - oldest))]
 
 
 @jit_inline_uncounted
 def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, int]:
     """Find where contact begins and ends in cell i.
 
-    Return whether there is contact at the end of the cell, and the number of patches found so far, or `FULL`.
+    Return whether there is contact at the end of the cell, and the number of patches found so far, or `LEFT_LIMITS`.
     """
     now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
     track, barriers = now.track, work.barriers
     if recovery.count[0] + VISITS > recovery.place.size or found + VISITS > work.start.size:
-        return contact, FULL
+        return contact, LEFT_LIMITS
     pressed = i < search.n and keeps_pressed(track, barriers, now.deborah, i, search.lift)
     barrier = barriers.cell[np.uintp(i)] if i < search.n else search.lift
     weak = (contact or pressed) and barrier >= recovery.bounds.least_lift[WINDOWS - 1]
@@ -428,7 +378,7 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
     if w >= _overtaking(search, scan[HELD], off, w) * (1 - ROUNDING):
         return off, off, False, by_force
     low, end = x, off
-    while end - low > CLOSE:  # bisection: u of free elements exceeds depth + h at `end`, but not at `low`
+    while end - low > ROUNDING:  # bisection: u of free elements exceeds depth + h at `end`, but not at `low`
         middle = 0.5 * (low + end)
         if search.depth + height_at(now.track, middle)[0] < displacement_at(now, recovery, middle)[0]:
             end = middle
@@ -465,11 +415,11 @@ def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
     work.start[found], work.end[found] = scan[BEGIN], end
     w = search.depth + height_at(now.track, end)[0]
     prune(now, work.recovery, end, w, motion.deepest)
-    scan[LOWEST] = _lowest_behind(search, w)
+    scan[LOWEST] = _lowest_beyond(search, w)
 
 
 @jit_inline_uncounted
-def _lowest_behind(search: Search, u: float) -> float:
+def _lowest_beyond(search: Search, u: float) -> float:
     """Return the least displacement of free elements one cell beyond a place where their displacement is u."""
     now, drift = search.now, search.work.recovery.bounds.least_drift[WINDOWS - 1]
     return float((u - drift) * np.exp(-1 / min(now.deborah, now.first.deborah)) + drift)
@@ -497,7 +447,7 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     if not (by_force or cell.weak) and peak <= scan[LOWEST]:
         return False, cell.stop
     u, u_slope, _ = displacement_at(now, recovery, probe)
-    scan[LOWEST] = _lowest_behind(search, u) if by_force else u
+    scan[LOWEST] = _lowest_beyond(search, u) if by_force else u
     if _stays_free(search, i, scan[LOWEST] - peak, _oldest(recovery, scan[FREE_FROM])):
         return False, cell.stop
     h, slope, _ = height_at(now.track, probe)

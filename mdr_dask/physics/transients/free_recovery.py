@@ -23,17 +23,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
-from mdr_dask.physics.transients.patches import History, Patches, Track, height_at
+from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Patches, Track, height_at
 
-ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
-# largest last Newton step towards a place of separation, in cells; the error is about the cube of this step
-NEAR = 0.02
 STRIDE = 2.0  # longest step towards a place of separation, in cells
-# largest last step towards the place where contact begins, in cells; the error is about the cube of this step
-MET = 1e-3
-CREST = 1e-3  # as a fraction of a cell: largest last interval of the search for the place of nearest approach
-FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
-MARGIN = 64.0  # the bounds for a distance are those of a window of twice this distance plus MARGIN cells
+ROUNDING = 1e-9  # smaller distances, in cells, and smaller relative differences of displacements are rounding errors
 # cells travelled in the shortest window; number of windows, each twice as long as the previous one
 WINDOW, WINDOWS = 8.0, 16
 
@@ -177,7 +170,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
     deborah = now.deborah
     first = x - deborah * now.time
     low, high, s = first, min(x, farthest), max(place, first)
-    for _ in range(ITERATIONS):
+    for _ in range(NEWTON_STEPS):
         if s > high:
             break
         since = (x - s) / deborah
@@ -186,7 +179,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
         force = d + h + rate + deborah * slope
         falls = (rate + change) / deborah + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
-        if abs(step) < NEAR:
+        if abs(step) < CLOSE:
             if s + step > x:  # the element at x has not reached the place of zero force yet
                 break
             fade = np.exp(-since)
@@ -201,7 +194,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
         s += min(max(step, -STRIDE), STRIDE)
         if not low < s < high:
             s = 0.5 * (low + high)
-        if high - low < NEAR:
+        if high - low < CLOSE:
             break
     return -1.0, 0.0, 0.0
 
@@ -213,7 +206,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
     The search starts at the node of the stretch for which the displacement is largest.
     """
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
-    low = max(low, x - now.deborah * now.time, s - FARTHEST)
+    low = max(low, x - now.deborah * now.time)
     while s >= low:
         since = (x - s) / now.deborah
         height = now.track.height[int(s if s >= 0 else _in_period(now, s))]
@@ -293,7 +286,7 @@ def contact_begin(
     and `high`.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
-    for _ in range(ITERATIONS):
+    for _ in range(NEWTON_STEPS):
         if not low < x < high:
             x = 0.5 * (low + high)
         gap, slope, bend, by_depth, opening = gap_at(now, recovery, x)
@@ -302,7 +295,7 @@ def contact_begin(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2.0
-        if abs(step) < MET or high - low < 1e-9:
+        if abs(step) < CLOSE or high - low < ROUNDING:
             if 2 * abs(bend * step) < slope:
                 step /= 1 + 0.5 * bend * step / slope
                 slope += bend * step
@@ -318,7 +311,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
     The search stops at the first place where the line is above the free elements.
     """
     x, gap = high, -1.0
-    while gap <= 0 and high - low > CREST:
+    while gap <= 0 and high - low > CLOSE:
         x = 0.5 * (low + high)
         gap, slope, _, _, _ = gap_at(now, recovery, x)
         if slope > 0:
@@ -342,7 +335,7 @@ def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepes
         if u < 0 and x - now.deborah * now.time < farthest:
             height = height_at(now.track, _in_period(now, place))[0]
             u = (deepest + height) * np.exp(-max(x - farthest, 0.0) / now.deborah)
-        if u + 2 * recovery.bounds.spread[window(2 * (x - place) + MARGIN)] >= pressed:
+        if u + 2 * recovery.bounds.spread[window(2 * (x - place))] >= pressed:
             recovery.earliest[kept], recovery.place[kept] = recovery.earliest[k], place
             recovery.farthest[kept], recovery.barrier[kept] = farthest, recovery.barrier[k]
             kept += 1

@@ -18,6 +18,7 @@ from mdr_dask.physics.transients.patches import (
     DRAG,
     LENGTH,
     LOAD,
+    NEWTON_STEPS,
     SUMS,
     TILT,
     Patches,
@@ -27,16 +28,13 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KEPT = 4  # number of velocities whose barriers are kept; successive cases often have the same velocities
-WHOLE = 1 - 1e-12  # contact counts as full if at least this fraction of the line is in contact
-NEWTON_STEPS = 60
-NEARLY = 1e-6  # largest relative error of the load before the last Newton step; the step squares this error
+NEARLY = float(np.sqrt(np.finfo(float).eps))  # relative error of the load before the last Newton step, which squares it
 
 
 class PreparedLine(NamedTuple):
     """One periodic line, prepared for the steady sweep and for the march.
 
-    `known` contains the :class:`Barriers` for the last few Deborah numbers.
+    `known` contains the :class:`Barriers` for up to two Deborah numbers, those before and after a jump.
     """
 
     cells: Cells
@@ -53,7 +51,7 @@ class PreparedLine(NamedTuple):
     def barriers(self, deborah: float) -> Barriers:
         """Return the barriers for a Deborah number, which is the distance v tau in cells."""
         if deborah not in self.known:
-            if len(self.known) >= KEPT:
+            if len(self.known) == 2:
                 self.known.clear()
             self.known[deborah] = barriers_for(int(self.track.cells))
         return self.known[deborah]
@@ -74,7 +72,8 @@ class SteadyLimits(NamedTuple):
     jump, `rate` is the derivative of the depth with respect to t / tau, and `tilt` is the derivative of the drag with
     respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values. `first` contains the
     contact patches before the jump, and `slower` the patches in steady sliding at the lower of the two velocities; both
-    are None if one of the two steady states was not found.
+    are None if one of the two steady states was not found. `is_full` states whether the whole line is in contact in
+    both steady states.
     """
 
     before: float
@@ -86,12 +85,8 @@ class SteadyLimits(NamedTuple):
     first: Patches | None
     slower: Patches | None
     contact: FloatArray
+    is_full: bool
     outcome: Outcome
-
-    @property
-    def is_full(self) -> bool:
-        """Whether the whole line is in contact in steady sliding before and after the jump."""
-        return bool(np.all(self.contact >= WHOLE))
 
 
 def steady_limits(
@@ -115,7 +110,7 @@ def steady_limits(
         outcome = Outcome(int(outcomes[k].max()))
         if outcome != Outcome.CONVERGED:
             no = np.nan
-            found.append(SteadyLimits(no, no, no, no, no, np.full(2, no), None, None, np.full(2, no), outcome))
+            found.append(SteadyLimits(no, no, no, no, no, np.full(2, no), None, None, np.full(2, no), False, outcome))
             continue
         both, drags = [], []
         for depth, speed in zip(depths[k], deborah[k] * n, strict=True):
@@ -125,7 +120,10 @@ def steady_limits(
         fast = float(deborah[k, 1] * n)
         at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
         slower, outcome = both[int(np.argmin(deborah[k]))], Outcome(end)
-        found.append(SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], outcome))
+        is_full = both[0].start.size == both[1].start.size == 1  # at the end of a free recovery, a second patch begins
+        found.append(
+            SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], is_full, outcome)
+        )
     return found
 
 

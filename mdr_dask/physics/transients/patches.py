@@ -16,8 +16,8 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
-ROOT_STEPS = 60
-CLOSE = 1e-2  # largest last step towards a zero of the force, in cells; the error is about the cube of this step
+NEWTON_STEPS = 60  # largest number of steps of Newton's method; so many bisections reach machine precision
+CLOSE = 1e-2  # largest last step towards an edge of contact, in cells; the error is about the cube of this step
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
@@ -133,7 +133,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     if not (begin >= near >= far >= end and begin > 0 >= end):
         return float(contact_end(p, q, r, c, 0.0, y))
     low, high, x = y, 1.0, y + width * begin / (begin - end)
-    for _ in range(ROOT_STEPS):
+    for _ in range(NEWTON_STEPS):
         value = p + x * (q + x * (r + x * c))
         if value > 0:
             low = x

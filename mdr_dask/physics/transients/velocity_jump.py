@@ -6,7 +6,6 @@ method is that of section 4.2 of the thesis, except that the velocity of the ele
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,31 +14,14 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
-from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
+from mdr_dask.physics.transients.contact_search import LEFT_LIMITS, Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
-from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth
+from mdr_dask.physics.transients.march import Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-# The steps grow in a constant ratio after ONSET times the time in which the line travels 1 / q_max, where q_max is the
-# largest wavenumber.
-ONSET = 0.5
-ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
-# NEWTON and SETTLED are divided by the number of steps per decade
-NEWTON = 0.2  # largest last Newton step of the depth, divided by the change of the steady depth
-# A march ends if depth and drag differ from the steady values by less than a certain fraction of their change. The
-# fraction is SETTLED or, if larger, OF_ACCURACY times the allowed error of the drag divided by the estimated transient.
-SETTLED = 0.04
-OF_ACCURACY = 0.1
 NEGLIGIBLE = 1e-5  # least change of the steady depth that is used, divided by the mean displacement
-# the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
-# NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
-LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
-# The depth may leave the interval between the steady depths by MARGIN times the length of this interval. If the depth
-# leaves the interval by more, the march is repeated with four times this margin. At most WIDENINGS attempts are made.
-MARGIN, WIDENINGS = 0.25, 3
-SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
-MOMENTS = 3000  # largest number of instants of a march
-STEEPEST = 3.0  # largest ratio of a slope to the smaller slope of the adjacent secants; steeper cubics may overshoot
+MEMORY = 7.0  # relaxation times after which the displacements at the jump have decayed, to less than 0.1 %
+STEEPEST = 3.0  # a cubic does not overshoot if its slopes are at most three times the secant (Fritsch and Carlson)
 
 
 class MarchRequest(NamedTuple):
@@ -48,8 +30,7 @@ class MarchRequest(NamedTuple):
     `times` are increasing times after the jump, (t - t_0) / tau. `wavenumber` is the largest wavenumber of the line
     times its length, q_max L; it determines the first step. `per_decade` is the number of steps per factor of ten in
     time. `accuracy` is the allowed error of the friction, divided by the steady friction after the jump. A transient
-    below this error is not marched, and a larger allowed error lets a march end earlier. With ``accuracy = 0`` every
-    transient is marched.
+    below this error is not marched. With ``accuracy = 0`` every transient is marched.
     """
 
     times: FloatArray
@@ -78,9 +59,9 @@ class Path(NamedTuple):
         edge of every patch. After the last instant drag and depth are equal to the steady values in `after`.
         """
         power = 0.5 if self.falls else 1.0
-        moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
-        pace = self.time[1] / power * (1 + moments) * moments ** (1 / power - 1)
-        curve = _limited_cubic(np.log1p(moments), self.values, self.rates * pace, np.log1p(wanted))
+        passed, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
+        pace = self.time[1] / power * (1 + passed) * passed ** (1 / power - 1)
+        curve = _limited_cubic(np.log1p(passed), self.values, self.rates * pace, np.log1p(wanted))
         return np.where(times > self.time[-1], after[:, None], curve)
 
 
@@ -139,9 +120,11 @@ def jump_between(
     if transient <= request.accuracy * limits.after:
         trace = np.where(times > 0, limits.after, limits.at)
         return settled._replace(trace=trace, depth=limits.depth[np.int64(times > 0)], left_out=transient)
-    path, outcome = relaxation.march(transient)
-    if path is None:
+    _, found, _, outcome = relaxation.march()
+    if outcome != Outcome.CONVERGED:
         return _failed(times, outcome)
+    values = np.stack([found.drag, found.depth - line.cells.top])  # depth relative to the mean line
+    path = Path(found.time, values, np.stack([found.drag_rate, found.rate]), bool(deborah[1] < deborah[0]))
     trace, depth = path.at(times, np.array([limits.after, limits.depth[1]]))
     return settled._replace(trace=trace, depth=depth, path=path)
 
@@ -171,23 +154,6 @@ class _Relaxation(NamedTuple):
         """Change of the steady depth due to the jump; allowed errors of the depth are fractions of this change."""
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
-    @property
-    def stepping(self) -> Stepping:
-        """Sizes of the time steps.
-
-        The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max at the speed
-        v_2, but at the latest after `ONSET` relaxation times. If the velocity falls, contact at the trailing edge of a
-        patch grows at the speed v_1 - v_2; this speed replaces v_2 if it is larger.
-        """
-        before, after = self.deborah / self.line.track.cells
-        growth = 10 ** (1 / self.request.per_decade)
-        onset = ONSET * min(1.0, 1 / (self.request.wavenumber * max(after, before - after)))
-        times = self.request.times
-        if after < before:
-            onset = min(onset / ROOT, float(times[times > 0][0]) / (growth - 1))
-        part = self.change / self.request.per_decade
-        return Stepping(onset * (growth - 1), growth, part, NEWTON * part, float(times[-1]))
-
     def transient(self) -> float:
         """Estimate the size of the transient, with a safety factor of two.
 
@@ -199,56 +165,54 @@ class _Relaxation(NamedTuple):
         limits = self.limits
         return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
 
-    @property
-    def intervals(self) -> Iterator[tuple[float, float]]:
-        """Wider and wider intervals around the steady depths."""
-        low, high = float(self.ends.min()), float(self.ends.max())
-        margin = MARGIN * (high - low) + NEGLIGIBLE * self.load / self.line.track.cells
-        for _ in range(WIDENINGS):
-            yield max(low - margin, SHALLOW * low), high + margin
-            margin *= 4
+    def march(self) -> tuple[Marching, Trajectory, Workspace, Outcome]:
+        """March from one steady state to the next.
 
-    def march(self, transient: float) -> tuple[Path | None, Outcome]:
-        """March from one steady state to the next; return the path (None if the march failed) and the outcome."""
-        after, request = self.limits.after, self.request
-        near = max(SETTLED / request.per_decade, OF_ACCURACY * request.accuracy * after / max(transient, 1e-300))
-        finish = Finish(float(self.ends[1]), after, near * self.change, near)
-        for interval in self.intervals:
-            marching, found, work = self.begun(interval)
-            count, outcome = march_depth(marching, self.stepping, finish, found, work)
-            if outcome != LEFT_LIMITS:
-                break
-        else:
-            return None, Outcome.DEPTH_NOT_FOUND
-        found = Trajectory(*(column[:count] for column in found))
-        values = np.stack([found.drag, found.depth - self.line.cells.top])  # depth relative to the mean line
-        falls = bool(self.deborah[1] < self.deborah[0])
-        path = Path(found.time, values, np.stack([found.drag_rate, found.rate]), falls)
-        if outcome != Outcome.CONVERGED:
-            return None, Outcome(outcome)
-        drag = path.values[0]
-        if path.time[-1] >= LONG and abs(drag[-1] - after) > NOT_STEADY[0] * np.ptp(drag) + NOT_STEADY[1] * after:
-            return None, Outcome.NOT_STEADY
-        return path, Outcome.CONVERGED
-
-    def begun(self, interval: tuple[float, float]) -> tuple[Marching, Trajectory, Workspace]:
-        """Return the constants, trajectory and workspace of a march whose depth stays in an interval.
-
-        Only the first instant of the trajectory is filled in.
+        The depth may leave the interval between the steady depths by the length of this interval. If the depth leaves
+        the interval by more, the march is repeated with 4 times and then with 16 times this margin.
         """
-        line, limits, stepping = self.line, self.limits, self.stepping
+        for widening in (1, 4, 16):
+            marching, found, work = self.begun(widening * self.change)
+            outcome = march_depth(marching, found, work)
+            if outcome != LEFT_LIMITS:
+                return marching, found, work, Outcome(outcome)
+        return marching, found, work, Outcome.DEPTH_NOT_FOUND
+
+    def begun(self, margin: float) -> tuple[Marching, Trajectory, Workspace]:
+        """Return the constants, trajectory and workspace of a march.
+
+        The depth may leave the interval between the steady depths by `margin`. The trajectory contains all times, but
+        otherwise only the first instant.
+
+        The times are equidistant in log(1 + t / onset). The onset is the time in which the line travels 1 / q_max at
+        the speed v_2, but at most one relaxation time. If the velocity falls, contact at the trailing edge of a
+        patch grows at the speed v_1 - v_2, which replaces v_2 if it is larger. This contact grows as sqrt(t), so that
+        the first step must then end before the first requested time.
+        """
+        line, limits, request = self.line, self.limits, self.request
         assert limits.first is not None
         assert limits.slower is not None
-        found = Trajectory(*np.empty((6, MOMENTS)))
-        for column, value in zip(found, (0.0, 0.0, self.ends[0], limits.rate, limits.at, np.nan), strict=True):
+        before, after = self.deborah / line.track.cells
+        onset = min(1.0, 1 / (request.wavenumber * max(after, before - after)))
+        if after < before:
+            onset = min(onset, float(request.times[request.times > 0][0]) / (10 ** (1 / request.per_decade) - 1))
+        until = min(request.times[-1], MEMORY)
+        last = np.log1p(until / onset)
+        steps = int(np.ceil(last / np.log(10) * request.per_decade))
+        found = Trajectory(onset * np.expm1(np.linspace(0, last, steps + 1)), *np.empty((4, steps + 1)))
+        found.time[-1] = until  # without rounding error, because `until` may be requested
+        for column, value in zip(found[1:], (self.ends[0], limits.rate, limits.at, np.nan), strict=True):
             column[0] = value
-        runs, bound = _runs(line.track, limits.slower, *interval)
+        low, high = max(self.ends.min() - margin, 0.0), self.ends.max() + margin
+        runs, free_until = _runs(line.track, limits.slower, low, high)
         begin, end = int(np.ceil(limits.slower.end[0])), int(limits.slower.start[-1])
         reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
-        onset = stepping.first / (stepping.growth - 1)
-        marching = Marching(line.track, limits.first, reachable, self.deborah[1], self.load, *interval, onset)
-        patches, barriers = limits.first.start.size, line.barriers(self.deborah[1])
-        return marching, found, workspace_for(patches, barriers, bound - self.ends[0])
+        # the error after the last Newton step is of fourth order in the time step, that of the differentiation of third
+        close = self.change / request.per_decade**2
+        marching = Marching(
+            line.track, limits.first, reachable, self.deborah[1], self.load, low, high, onset, last / steps, close
+        )
+        return marching, found, workspace_for(limits.first.start.size, line.barriers(self.deborah[1]), free_until)
 
 
 @jit

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from references.largest_displacement import judged, marched, searched_afresh
+from references.largest_displacement import judged, searched_afresh
 from schemes import rough_line
 
 from mdr_dask.physics.outcome import Outcome
@@ -31,8 +31,9 @@ def test_every_moment_carries_the_load(ratio: float) -> None:
     limits, request, cells = steady_limits(line, loads, numbers), MarchRequest(TIMES, np.pi * 400, 6), line.track.cells
     for k in range(loads.size):
         relaxation = _Relaxation(line, loads[k] * cells, numbers[k] * cells, limits[k], request)
-        marching, found, work, count = marched(relaxation)
-        for now in range(1, count):
+        marching, found, work, outcome = relaxation.march()
+        assert outcome == Outcome.CONVERGED
+        for now in range(1, found.time.size):
             searched_afresh(marching, found, now, work)
             missing.append(abs(work.sums[LOAD] / marching.load - 1))
     assert len(missing) > 100

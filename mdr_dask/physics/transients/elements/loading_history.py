@@ -29,7 +29,6 @@ from mdr_dask.physics.transients.elements.foundation import (
 from mdr_dask.physics.transients.elements.steps import Edges, Schedule, State, follow_elements, mean_after, note_edges
 
 PERIODS = 3000  # largest number of periods of the line until the state of an element repeats
-STEADY = 1e-14  # tolerance of the depth of the steady state at the start, as a fraction of the depth
 LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at the start
 
 
@@ -76,7 +75,7 @@ def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float
         low, width = low + width, 2 * width
     if not np.isfinite(found):
         return state, np.nan, Outcome.DEPTH_NOT_FOUND
-    depth = brentq(excess, low, low + width, xtol=1e-15 * width, rtol=STEADY)
+    depth = brentq(excess, low, low + width, xtol=1e-15 * width)
     if not abs(excess(depth)) < LOAD_MISSED:
         return state, depth, Outcome.DEPTH_NOT_FOUND
     outside = not line.periodic and bool(state.touching[0] or state.touching[-1])
@@ -174,7 +173,7 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
     interpolated linearly between elements, which is most accurate for a line without kinks. `state` and `depth`
     describe the first instant; they are not overwritten.
     """
-    now, out = deepcopy(state), np.full((3, schedule.moments.size), np.nan)
+    now, out = deepcopy(state), np.full((3, schedule.instants.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
     drag, depths, contact = out
     return Response(drag, depths, contact, Outcome(status), now)
@@ -186,7 +185,6 @@ CELLS = 6.0  # largest number of cells that the line travels in a step
 PART = 0.12  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
 FIRST = 0.012  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
 NEARLY = 1e-2  # a time step is left out if its end differs from a requested time by less than this fraction of the step
-ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 
 @dataclass(frozen=True)
@@ -232,7 +230,7 @@ class Piece:
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
         return np.inf if same else self.end - self.start
 
-    def moments(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
+    def instants(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
         """Return the times of all steps from the start of the piece to `end`, or None if there would be too many steps.
 
         The steps begin small and grow in a constant ratio up to the longest step.
@@ -251,9 +249,9 @@ class Piece:
         late = grown[-1] if grown.size else 0.0
         count = max(int(np.ceil((span - late) / most)), 1)
         rest = late + (span - late) * np.arange(1, count + 1) / count
-        moments: FloatArray = self.start + np.concatenate([[0.0], grown, rest])
-        moments[-1] = end  # without rounding error: the next piece begins at `end`, and `end` may be requested
-        return moments
+        instants: FloatArray = self.start + np.concatenate([[0.0], grown, rest])
+        instants[-1] = end  # without rounding error: the next piece begins at `end`, and `end` may be requested
+        return instants
 
 
 class Trace(NamedTuple):
@@ -300,19 +298,19 @@ def trace(
     for piece in pieces:
         if piece.start > times[-1]:
             break
-        moments = piece.moments(min(piece.end, float(times[-1])), line.height.size - 1, per_decade)
-        if moments is None:
+        instants = piece.instants(min(piece.end, float(times[-1])), line.height.size - 1, per_decade)
+        if instants is None:
             return _failed(times, Outcome.TOO_MANY_STEPS)
-        moments = _with_times(moments, times)
-        way, speed, load = piece.at(moments)
-        part = follow_line(line, solid, Schedule(moments, travel + way, speed, load), state, depth)
+        instants = _with_times(instants, times)
+        way, speed, load = piece.at(instants)
+        part = follow_line(line, solid, Schedule(instants, travel + way, speed, load), state, depth)
         if part.status != Outcome.CONVERGED:
             return _failed(times, part.status)
-        found.append((moments, part.drag / load, part.depth, part.contact))
+        found.append((instants, part.drag / load, part.depth, part.contact))
         state, depth, travel = part.state, float(part.depth[-1]), float(travel + way[-1])
-    moment, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
+    instant, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
     at, after = float(friction[0]), _end(line, solid, pieces[-1])
-    last = np.searchsorted(moment, times, side="right") - 1  # for the time of a jump, the instant just after it
+    last = np.searchsorted(instant, times, side="right") - 1  # for the time of a jump, the instant just after it
     return Trace(first, at, after, friction[last], depths[last], float(contact.max()), Outcome.CONVERGED)
 
 
@@ -342,16 +340,16 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
     """Return the times, each replaced by the start of a piece if the two differ only by a rounding error."""
     nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
-    found: FloatArray = np.where(np.abs(times - nearest) <= ROUNDING * nearest, nearest, times)
+    found: FloatArray = np.where(np.isclose(times, nearest, rtol=1e-12, atol=0), nearest, times)
     return found
 
 
-def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
+def _with_times(instants: FloatArray, times: FloatArray) -> FloatArray:
     """Return the times of the steps and the requested times, without steps that end very near to a requested time."""
-    inside = times[(times > moments[0]) & (times < moments[-1])]
+    inside = times[(times > instants[0]) & (times < instants[-1])]
     around = np.concatenate([[-np.inf], inside, [np.inf]])
-    after = np.searchsorted(around, moments)
-    distance = np.minimum(around[after] - moments, moments - around[after - 1])
-    apart = distance > NEARLY * np.diff(moments, prepend=moments[0])
+    after = np.searchsorted(around, instants)
+    distance = np.minimum(around[after] - instants, instants - around[after - 1])
+    apart = distance > NEARLY * np.diff(instants, prepend=instants[0])
     apart[[0, -1]] = True
-    return np.union1d(moments[apart], inside)
+    return np.union1d(instants[apart], inside)

@@ -304,7 +304,7 @@ class Schedule(NamedTuple):
     F_N / (4 G_inf L), positive, and linear between the instants.
     """
 
-    moments: FloatArray
+    instants: FloatArray
     travels: FloatArray
     deborahs: FloatArray
     loads: FloatArray
@@ -451,16 +451,16 @@ def follow_elements(
 
     `out`, shape (3, instants), receives the drag, the depth, and the fraction of the line in contact.
     """
-    moments, travels, deborahs, loads = schedule
+    instants, travels, deborahs, loads = schedule
     workspace, modes = _workspace_for(solid, line.height.size - 1), np.empty(solid.rates.size)
     shift, rate = under_elements(line, travels[0], workspace.under, workspace.slope), 0.0
     if solid.viscosity == 0:
         depth, good = _load_instantly(solid, state, workspace.under, loads[0], depth)
         if not good:
             return Outcome.DEPTH_NOT_FOUND
-    for now in range(moments.size):
+    for now in range(instants.size):
         if now > 0:
-            time = moments[now] - moments[now - 1]
+            time = instants[now] - instants[now - 1]
             workspace.old_under[:] = workspace.under
             workspace.old_slope[:] = workspace.slope
             old_depth, old_shift = depth, shift
