@@ -102,6 +102,18 @@ def test_an_anisotropic_map_needs_a_direction(tmp_path):
     assert "waves along y" in " ".join(surface(tmp_path, map=options | {"direction": "x"}).notes())
 
 
+def test_noise_hides_no_grooves_and_few_waves_are_no_grooves(tmp_path):
+    """Only the wavelengths above the noise count, and few waves of an isotropic map have much scatter."""
+    noise = 2e-7 * np.random.default_rng(1).standard_normal(HEIGHT.shape)
+    options = {"files": ["map.npy"], "spacing": LENGTH / POINTS, "unit": "m"}
+    np.save(tmp_path / "map.npy", HEIGHT[:, :1] + noise)
+    assert "expected an isotropic surface" in refused(tmp_path, map=options)
+    few = self_affine(0.7, LENGTH / 4, LENGTH / 8, 1e-6)
+    for realisation in range(10):
+        np.save(tmp_path / "map.npy", areal_surface(few, (POINTS, POINTS), (LENGTH, LENGTH), 1, realisation) + noise)
+        assert surface(tmp_path, map=options).map.found()[0].resolution > 0
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [

@@ -12,6 +12,7 @@ from scipy import fft, sparse
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.physics.surfaces.scans import Cut, averaged
+from mdr_dask.physics.surfaces.self_affine import noise_limit
 from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 Order = Literal["none", "mean", "plane", "parabola"]
@@ -20,6 +21,7 @@ MOST_MISSING = 0.05  # largest accepted fraction of missing points; missing poin
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
 SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
 MOST_SCATTER = 0.02  # an octave is used if scatter alone causes angular harmonics with at most this mean square
+BY_SCATTER = 4.0  # on an isotropic map, an octave exceeds this many times that mean square in exp(-4) = 2 % of cases
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 
 
@@ -187,13 +189,14 @@ class MapSpectrum:
         return Spectrum(q[there], cut[there] / (np.pi * q[there]))
 
     def anisotropy(self) -> float:
-        """Return the anisotropy, corrected for scatter: 0 for an isotropic surface, 1 if all waves have one direction.
+        """Return the anisotropy: 0 for an isotropic surface, 1 if all waves have one direction.
 
         The anisotropy is the larger of the second and the fourth angular harmonic of the power. The rms of each
-        harmonic is taken over octaves of the wave number. Octaves with few waves are left out, because their harmonics
-        have much scatter.
+        harmonic is taken over octaves of the wave number, without waves that are only noise. Octaves with few waves are
+        left out, because their harmonics have much scatter. What scatter alone may cause is subtracted.
         """
-        there = np.flatnonzero(significant(self.wavenumber, self.density))
+        is_rough = self.wavenumber <= noise_limit(self.binned()) * (1 + 1e-9)
+        there = np.flatnonzero(significant(self.wavenumber, self.density) & is_rough)
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
         _, octave = np.unique(octave, return_inverse=True)  # number only the octaves that contain rings
         power = self.density[there] * self.wavenumber[there]
@@ -203,7 +206,7 @@ class MapSpectrum:
         found = []
         for harmonic in self.angular[:, there]:
             sums = np.bincount(octave, power * harmonic.real) + 1j * np.bincount(octave, power * harmonic.imag)
-            found.append(np.mean((np.abs(sums / weight) ** 2 - scatter)[sure]))
+            found.append(np.mean((np.abs(sums / weight) ** 2 - BY_SCATTER * scatter)[sure]))
         return float(np.sqrt(max(0.0, *map(float, found))))
 
 
