@@ -250,6 +250,9 @@ def write_profile(path, spacing, heights):
     return str(path)
 
 
+SIZES = ((6000, 0.5e-6), (5000, 0.6e-6))  # numbers of points and spacings of two profiles of equal length
+
+
 def profiles(tmp_path, spacing_2=1e-6, size_2=4000):
     generator = np.random.default_rng(1)
     one = np.convolve(generator.normal(size=4008), np.ones(9) / 9, "valid") * 6e-7
@@ -274,6 +277,22 @@ def test_measured_profiles_take_the_place_of_generated_lines(tmp_path):
     assert scaled == pytest.approx(4e-7 / (2e-7 * np.sqrt(2)), rel=1e-3)
 
 
+def test_profiles_of_different_spacings_are_interpolated_to_the_finer_one(tmp_path):
+    heights = [6e-7 * np.sin(2 * np.pi * np.arange(size) * spacing / 5e-5) for size, spacing in SIZES]
+    paths = [write_profile(tmp_path / f"{k}.csv", SIZES[k][1], heights[k]) for k in range(2)]
+    rollers = {"rms_roughness": None, "surface_1": {"profile": paths[0]}}
+    values = [MODEL.compute(block(**rollers, surface_2={"profile": path})).values["film_ratio"][0, 0] for path in paths]
+    assert values[1] == pytest.approx(values[0], rel=1e-3)
+    (note,) = MODEL.notes([MODEL.parameters(**SMALL | rollers | {"surface_2": {"profile": paths[1]}})])
+    assert "rms heights are then 424.3 nm and 424.3 nm" in note
+
+
+def test_a_longest_wavelength_beyond_the_contact_is_noted():
+    assert not MODEL.notes([MODEL.parameters(**SMALL | {"normal_force": force}) for force in (10.0, 100.0)])
+    (note,) = MODEL.notes([MODEL.parameters(**SMALL | {"normal_force": force}) for force in (10.0, 99.0)])
+    assert "exceeds the largest contact width" in note
+
+
 @pytest.mark.slow
 def test_creep_on_measured_profiles_has_the_mean_of_pure_rolling_and_of_swapped_rollers(tmp_path):
     """With S = -1, a revolution covers half of line 1; a fixed start would shift the mean by 20 standard errors."""
@@ -293,7 +312,6 @@ def test_creep_on_measured_profiles_has_the_mean_of_pure_rolling_and_of_swapped_
 
 
 def test_bad_profiles_give_one_error(tmp_path):
-    assert "expected profiles of the same spacing, got 1e-06 m and 2e-06 m" in refused(**profiles(tmp_path, 2e-6))
     files = profiles(tmp_path)
     assert "expected both surface_1 and surface_2 or neither" in refused(surface_1=files["surface_1"])
     (tmp_path / "bad.csv").write_text("x [m], z [m]\n1, 2\n3, 2x\n")
@@ -309,9 +327,12 @@ def test_bad_profiles_give_one_error(tmp_path):
         ({"film_thickness": 1e-4}, "the film is thicker than 0.1 of the radius"),
         ({"film_thickness": None, "normal_force": 1.0}, "film formula Pan-Hamrock (central) is extrapolated: W lies"),
         ({"film_thickness": 1e-8, "rms_roughness": 2e-5}, "asperities merge into large clusters"),
+        ({"roller_width": 9e-5, "longest_wavelength": 1e-4}, "the rollers are narrower than this square"),
     ],
 )
 def test_cases_beyond_the_tested_range_have_a_warning(changes, message):
     result = MODEL.compute(block(["film", "breakthrough_probability"], **changes))
     assert result.status[0, 0] == Status.DONE
     assert message in result.messages[0, 0]
+    of_film = MODEL.compute(block(["film"], **changes)).messages
+    assert (message in of_film.get((0, 0), "")) == ("clusters" not in message)  # these concern only the breakthroughs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -22,6 +22,7 @@ from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import STEEL, HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil
+from mdr_dask.units import shown_apart
 
 Positive = Annotated[float, Field(gt=0)]
 WAVES = 100_000  # default circumference of a roller over the shortest wavelength
@@ -69,15 +70,16 @@ class MixedLubrication(Parameters):
     )
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "longest wavelength of the roughness; auto is the width 2a of the Hertzian contact under cutoff_force. With "
-        "measured profiles, it does not change the lines, but only the load on the asperities and the number of "
-        "independent squares",
+        "longest wavelength of the roughness; the pressure on the asperities at a given film is inversely proportional "
+        "to it. auto is the width 2a of the Hertzian contact under cutoff_force. Waves of measured profiles are not "
+        "removed",
         usual="0.4 mm",
         default="auto",
     )
     cutoff_force: float = quantity(
         "N",
-        "normal force for longest_wavelength: auto; the contact width under this force is the longest wavelength",
+        "normal force for longest_wavelength: auto, the largest force of a rig; the contact width under this force is "
+        "the longest wavelength",
         usual="1600 N",
         default=1600,
         gt=0,
@@ -241,6 +243,22 @@ class MixedLubrication(Parameters):
         return hertz_line(force / self.roller_width, self.contact_modulus, self.radius)
 
 
+def notes(sets: Sequence[MixedLubrication]) -> tuple[str, ...]:
+    """Return notes on measured lines, and on a longest wavelength that exceeds the contact width under every force."""
+    pairs = dict.fromkeys(one.source() for one in sets)
+    lines = tuple(pair.note() for pair in pairs if isinstance(pair, Measured))
+    longest = max(one.longest() for one in sets)
+    width = max(2 * float(one.dry_contact(one.normal_force).half_width) for one in sets)
+    if longest <= width * (1 + 1e-9):
+        return lines
+    wave, widest = shown_apart("m", longest, width)
+    return (
+        *lines,
+        f"the longest wavelength, {wave}, exceeds the largest contact width 2a, {widest}: the load on the asperities "
+        "may be far too low (see 'The longest wavelength' in docs/mixed-lubrication.md)",
+    )
+
+
 OUTPUTS = (
     Output(
         "breakthrough_probability",
@@ -345,6 +363,7 @@ MODEL = Model(
         "film_thickness",
     ),
     coordinates=coordinates,
+    notes=notes,
     numbers=(
         Number(
             "load_parameter",

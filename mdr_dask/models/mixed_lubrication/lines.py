@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
+from mdr_dask.units import shown
 
 MOST_POINTS = 10**7  # of a line: capacity of the memory
 LEAST_PER_WAVE = 2.5  # points per shortest wavelength on the coarsest of the grids for `points: auto`; 2 is the least
@@ -123,7 +125,10 @@ class OfSurfaces(_Random):
 
 @dataclass(frozen=True)
 class Measured:
-    """Two measured lines. The end of each line is joined to its beginning."""
+    """Two measured lines. The end of each line is joined to its beginning.
+
+    If their spacings differ, the coarser line is interpolated to the spacing of the finer one.
+    """
 
     file_1: ProfileFile
     file_2: ProfileFile
@@ -132,19 +137,30 @@ class Measured:
     @property
     def points(self) -> tuple[int, int]:
         """Numbers of points on the coarse and the fine grid. Both lines are cut to the same even number of points."""
-        half = min(line_of(file).height.size for file in (self.file_1, self.file_2)) // 2
+        half = min(height.size for height in self._heights()) // 2
         return half, 2 * half
+
+    @property
+    def spacing(self) -> float:
+        """Distance between points in m."""
+        one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
+        return one if _are_equal(one, two) else min(one, two)
 
     def length(self, _: float) -> float:
         """Return the length of the lines in m; it does not depend on the perimeter of the rollers."""
-        return self.points[-1] * line_of(self.file_1).spacing
+        return self.points[-1] * self.spacing
 
     def problem(self, _: float) -> str:
-        """Return the reason why the two lines cannot be combined, or an empty string if they can."""
-        one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
-        if abs(one - two) > 1e-3 * one:
-            return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"
+        """Return an empty string: any two measured lines can be combined."""
         return ""
+
+    def note(self) -> str:
+        """Return a description of the two lines as they are used, with their rms heights before any scaling."""
+        first, second = (shown(float(line.std()), "m") for line in self._levelled())
+        return (
+            f"both profiles are used without tilt, with {self.points[-1]} points over {shown(self.length(0.0), 'm')}; "
+            f"their rms heights are then {first} and {second}"
+        )
 
     def combined_rms(self) -> float:
         """Return the rms height of the sum of the two lines, in m; it is dimensionless if the lines are scaled."""
@@ -165,12 +181,34 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
+        """Return the lines of equal length, scaled to the rms height 1 if this is wanted."""
+        first, second = (line / line.std() if self.scaled else line for line in self._levelled())
+        return first, second
+
+    def _levelled(self) -> list[FloatArray]:
         """Return the lines without mean and tilt, so that the two ends of a line meet without a large step."""
         from mdr_dask.physics.surfaces.measured import detrended
 
-        lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]
-        first, second = (line / line.std() if self.scaled else line for line in lines)
-        return first, second
+        return [detrended(height[: self.points[-1]], "line") for height in self._heights()]
+
+    def _heights(self) -> list[FloatArray]:
+        return [_heights_at(file, self.spacing) for file in (self.file_1, self.file_2)]
+
+
+def _are_equal(one: float, two: float) -> bool:
+    return abs(one - two) <= 1e-3 * one
+
+
+@lru_cache(maxsize=16)
+def _heights_at(file: ProfileFile, spacing: float) -> FloatArray:
+    """Return the heights of a measured line at points with this spacing, by a cubic spline if it is not its own."""
+    from scipy.interpolate import CubicSpline
+
+    line = line_of(file)
+    if _are_equal(spacing, line.spacing):
+        return line.height
+    place = line.spacing * np.arange(line.height.size)
+    return np.asarray(CubicSpline(place, line.height)(np.arange(0, place[-1], spacing)), dtype=np.float64)
 
 
 Source = Generated | OfSurfaces | Measured

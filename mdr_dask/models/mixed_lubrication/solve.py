@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -61,7 +61,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
         fixed = fixed_values(operation)
         _store(result, block, index, slice(None), fixed)
         if 0 in block.realisations:
-            for warning in _warnings(operation):
+            for warning in _warnings(operation, block.outputs):
                 result.add_message(index, block.realisations.index(0), warning)
         for position in range(len(block.realisations)):
             _add_missed(result, block, index, position, fixed, _FLOORS)
@@ -148,11 +148,16 @@ def _realise(
         _store(result, block, index, position, numbers | arrays[k])
 
 
-def _warnings(operation: Operation) -> Iterator[str]:
-    """Yield a warning for each assumption of the model that a case violates."""
+def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:
+    """Yield a warning for each assumption of the model that a case violates, if it concerns the requested outputs."""
     if operation.warning:
         yield operation.warning
-    if operation.film / operation.rms < 0.5:
+    if operation.squares < 1:
+        yield (
+            "a rough line represents a square with the longest wavelength as edge, but the rollers are narrower than "
+            "this square (give a smaller longest_wavelength)"
+        )
+    if operation.film / operation.rms < 0.5 and _OF_LINES & set(outputs):
         yield (
             "the film ratio is below 0.5: asperities merge into large clusters that do not "
             "break the layer, so the probability is too low"
