@@ -447,6 +447,8 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
     if wrong:
         length = int(grid.length[wrong[0]])
         hint = " (put semicolons between the values if they have decimal commas)" if length > width else ""
+        if grid.word[wrong[0]].any():
+            hint = " (write a missing number as one word, such as nan, or put semicolons between the cells)"
         hint = " (write names without blanks, or put tabs between the columns)" if blanks else hint
         grid.require(wrong, 0, f"expected {width} values as in {first}, got {length}{hint}")
 

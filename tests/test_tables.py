@@ -97,6 +97,10 @@ WRONG = {
         "f [Hz],E' [Pa]\n1,5,2\n",
         "2:1: expected 2 values as in line 1, got 3 (put semicolons between the values if they have decimal commas)",
     ),
+    "missing number of two words": (
+        "a b c\n1 0 3\n1 0 No Data\n",
+        "3:1: expected 3 values as in line 1, got 4 (write a mis",
+    ),
     "no names": ("1,2,3,4,5\n1,2,3,4,5\n", "1:1: expected the names of the 5 columns in the first line"),
     "long cell": ("f [Hz],E' [Pa]\n1," + "9" * 200_000 + "\n", "2:3: $expected a number"),
 }

@@ -71,6 +71,7 @@ LAYOUTS = {
     "positions beside a slope": (joined(np.vstack([np.r_[0, X], np.c_[JITTERED_Y, SLOPE]])), UNITS, False),
     "missing as 9999 once": (joined(holed(9999, again=False)), UNITS, True),
     "xyz with jitter": (joined(xyz(order=SHUFFLED) + JITTER), XYZ, True),
+    "xyz in pixels": (joined(xyz() / [STEP * 1e6, STEP * 1e6, 1]), UNITS, False),
     "xyz with units": ("x [um] y [um] z [nm]\n" + joined(xyz() * [1, 1, 1e3], " "), Units(), False),
     "xyz with units in a remark": ("# X (mm), Y (um), Z (nm)\n" + joined(xyz() * [1e-3, 1, 1e3], ","), Units(), False),
     "xyz among others": (
@@ -144,6 +145,10 @@ SCANS = {
     "number, x, z": (joined(np.c_[np.arange(200), PLACE, HEIGHT]), Units("um", "mm")),
     "names": ("z [um],x [mm]\n" + joined(np.c_[HEIGHT, PLACE], ","), Units()),
     "names between blanks": ("x [mm] z [um]\n" + joined(np.c_[PLACE, HEIGHT], " "), Units()),
+    "heights below results": (
+        "//Header\nLc,0.8,mm\n//Result\nRa,0.354,um\nRz,3.005,um\n//Data,R-profile\n" + joined(HEIGHT[:, None]),
+        Units("um", "", 9.4e-3 / 199),
+    ),
     "names without units": ("x z\n" + joined(np.c_[PLACE, HEIGHT], " "), Units("um", "mm")),
 }
 

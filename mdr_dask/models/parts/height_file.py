@@ -137,7 +137,8 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
     Unit and spacings are taken from the file or from the options of the user. If only the unit of the positions is
     missing, it is found from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the
-    unit is 1e-6 m. A unit that is found in this way is a power of ten of a metre.
+    unit is 1e-6 m. A unit that is found in this way is a power of ten of a metre. Positions 0, 1, 2 ... without a unit
+    are numbers of pixels if the user states the spacing.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -148,7 +149,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     ):
         length = step * metre if step and metre else None
         user = given or (spacings[0] if spacings and units.spacing and step else None)
-        if step and user and not metre:
+        if step and user and not metre and not math.isclose(step, 1.0, rel_tol=1e-9):
             length = step * 10.0 ** round(math.log10(user / step))
         sources = {"its positions": length, "its heading": stated, f"`{option}`": given}
         known = [(source, length) for source, length in sources.items() if length]
@@ -441,22 +442,24 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return the positions and the heights of a line scan, both in m, from a table.
 
-    If the columns have no names, the positions are the column whose numbers only rise or only fall. If the table
-    contains only heights, the user must give the spacing.
+    If the columns have no names, the positions are the column whose numbers only rise or only fall. A single column of
+    numbers contains the heights, even below text that does not name them; the user must then give the spacing.
     """
     text = file.read_text()
     sheet = read_sheet(text, file.name)
-    if sheet.names:
-        columns = (
-            Column("x", "m", needed=False, given_unit=units.position),
-            Column("z", "m", ("height", "y", "Y", "profile"), given_unit=units.height),
-        )
+    columns = (
+        Column("x", "m", needed=False, given_unit=units.position),
+        Column("z", "m", ("height", "y", "Y", "profile"), given_unit=units.height),
+    )
+    is_named = any(match(*heading, columns)[0] for heading in zip(sheet.names, sheet.units, strict=False))
+    filled = np.flatnonzero(np.any(sheet.cells != "", axis=0))
+    if sheet.names and (is_named or filled.size > 1):
         table = read_table(text, file.name, columns, allow_missing=True)
         if "x" in table and units.spacing is not None:
             raise DataError(f"{file.name}: the file has positions: leave out `spacing`")
         x, z = table.get("x"), table["z"]
     else:
-        rows = numbers(sheet)
+        rows = numbers(sheet)[:, filled]
         count = rows.shape[1]
         rises = [k for k, one in enumerate(positions.rising(rows.T)) if one]
         along = [] if count == 1 else [k for k in rises if not positions.is_numbered(rows[:, k])] or rises
@@ -466,12 +469,13 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
                 f"{file.name}: expected one column of positions and one of heights, got {count} columns: name the "
                 "columns in a header line above the numbers, such as x [mm], z [um]"
             )
-        wanted = [("heights", "unit", units.height), ("positions", "x_unit", units.position)][: 1 + len(along)]
-        missing = [f"unit of its {what}: give `{option}`, such as um" for what, option, unit in wanted if not unit]
+        unit = _one_unit(file, "unit", sheet.units[filled[across[0]]], units.height)
+        wanted = [("heights", "unit", unit), ("positions", "x_unit", units.position)][: 1 + len(along)]
+        missing = [f"unit of its {what}: give `{option}`, such as um" for what, option, found in wanted if not found]
         if missing:
             raise DataError("\n".join(f"{file.name}: does not state the {what}" for what in missing))
         x = rows[:, along[0]] * _metre(file, units.position, "x_unit") if along else None
-        z = rows[:, across[0]] * _metre(file, units.height, "unit")
+        z = rows[:, across[0]] * _metre(file, unit, "unit")
     if x is not None:
         return x, z
     if units.spacing is None:
