@@ -104,13 +104,15 @@ def test_several_figures_and_parts_of_a_study_are_drawn(filled, capsys):
 
 
 def test_a_warning_is_printed_once_for_all_figures(filled, capsys, monkeypatch):
+    """Warnings are counted by case: the first and the last message are of two realisations of one case."""
     message = {"series": "", "status": "done", "case": {}, "attempt": 0}
-    texts = ["the film is thin: ratio 0.2; the load is high", "the film is thin: ratio 0.3", "the load is high"]
-    found = [message | {"message": text} for text in texts]
+    texts = ["the film is thin: ratio 0.2; the load is high", "the film is thin: ratio 0.3", "the film is thin"]
+    places = ([0, 0], [1, 0], [0, 1])
+    found = [message | {"message": text, "place": place} for text, place in zip(texts, places, strict=True)]
     monkeypatch.setattr("mdr_dask.questions.progress.messages", lambda *_: found)
     assert main(["plot", filled, "velocity", "force", "-o", "drawn"]) == 0
     errors = capsys.readouterr().err.splitlines()
-    assert f"all figures: warning: the film is thin (2 results of {filled})" in errors
+    assert f"all figures: warning: the film is thin (2 cases of {filled})" in errors
     assert sum("warning: the load is high" in line for line in errors) == 1
     assert "warning: the film is thin" in Path("drawn/small-force.csv").read_text()
 

@@ -144,7 +144,7 @@ def _warnings(urls: Sequence[str]) -> list[str]:
         studies = stores.datasets(url)
         messages = [message for name, data in studies.items() for message in progress.messages(url, name, data)]
         warnings = progress.warnings(messages)
-        found += [f"{text} ({count} result{'s' * (count > 1)} of {url})" for text, count in warnings.items()]
+        found += [f"{text} ({count} case{'s' * (count > 1)} of {url})" for text, count in warnings.items()]
     return found
 
 

@@ -169,7 +169,7 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
     )
     _print_failed(url, progress)
     if progress.warned:
-        click.echo(f"{progress.warned} done with a warning: mdr-dask status {url} --messages", err=True)
+        click.echo(f"warnings: {progress.warned}: mdr-dask status {url} --messages", err=True)
 
 
 def _print_failed(url: str, progress: Progress) -> None:

@@ -83,12 +83,12 @@ def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) 
 
 
 def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """For each warning, return the number of results that have it. Details after the colon of a warning are removed."""
-    groups: dict[str, list[str]] = {}
+    """For each warning, return the number of cases that have it. Details after the colon of a warning are removed."""
+    groups: dict[str, dict[tuple[Any, ...], str]] = {}
     for message in (each for each in found if each["status"] == "done"):
         for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
-            groups.setdefault(_NUMBER.sub("#", text), []).append(text)
-    return {_merged(alike): len(alike) for alike in groups.values()}
+            groups.setdefault(_NUMBER.sub("#", text), {})[message["series"], *message["place"][:-1]] = text
+    return {_merged(list(alike.values())): len(alike) for alike in groups.values()}
 
 
 #: Pattern of a number or range of numbers with an SI unit for which campaign files often use another unit.
