@@ -22,6 +22,7 @@ from mdr_dask.errors import CampaignError, DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
 from mdr_dask.models.base import Status
+from mdr_dask.plots import page
 from mdr_dask.questions import selection
 from mdr_dask.questions.columns import Columns, numbers, states
 from mdr_dask.questions.labelled import labelled
@@ -163,6 +164,7 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
 
 def aggregate(
     study: Study,
+    outputs: Words = (),
     statistics: Words = aggregation.NAMES,
     *,
     series: str | None = None,
@@ -178,6 +180,8 @@ def aggregate(
     ----------
     study : Dataset, DataTree, str or Path
         A study, or the path or URL of its store.
+    outputs : sequence of str
+        Names of outputs; by default, all outputs with one number for each result.
     statistics : sequence of str
         Some of `mdr_dask.aggregation.NAMES`.
     series, select, where, group_by, columns, units
@@ -189,8 +193,8 @@ def aggregate(
         A variable ``<output>_<statistic>`` for every output and statistic, and ``state_counts``.
     """
     parts = (_several(select), where, _several(group_by), (), _several(columns), units or {})
-    asked = Question((), *parts, _several(statistics))
-    return labelled(_group(study, series), asked)
+    asked = Question(_several(outputs), *parts, _several(statistics))
+    return store.with_plain_attributes(labelled(_group(study, series), asked))
 
 
 def table(
@@ -265,7 +269,22 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     return xr.DataTree.from_dict({f"/{name}": data for name, data in found.items()})
 
 
-def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
+def plot(
+    study: Study,
+    figure: str,
+    select: Words = (),
+    *,
+    where: str = "",
+    over: Words | None = None,
+    by: str = "",
+    panels: str = "",
+    log: str | None = None,
+    measured: str | Path | pd.DataFrame | None = None,
+    units: Mapping[str, str] | None = None,
+    size: str | None = None,
+    title: str | None = None,
+    style: str | None = None,
+) -> Figure:
     """Draw a named figure or an output, like ``mdr-dask plot``.
 
     Parameters
@@ -274,12 +293,12 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
         A study, or the path of its store.
     figure : str
         Name of a figure or of an output.
-    select : sequence of str
-        Parts of the study, as for the option ``--select``.
-    **view
-        Options for an output. ``over`` is one axis for curves, two axes for a map, or empty for main effects. By
-        default, it is the axis with the most values. For ``by``, ``panels`` and ``log`` see
-        :class:`mdr_dask.plots.view.View`.
+    over : sequence of str, optional
+        One axis for curves of an output, two axes for a map, or empty for main effects. The default is the axis with
+        the most values.
+    select, where, by, panels, log, measured, units, size, title, style
+        As the options of the command. `measured` may also be a DataFrame, with units in brackets after the column
+        names.
 
     Returns
     -------
@@ -294,13 +313,22 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     groups = _groups(study)
     model = _model(groups)
     known = plots.available(model)
-    if view or (figure not in known and any(figure in data.data_vars for data in groups.values())):
+    of_output = over is not None or by or panels or log is not None
+    if of_output or (figure not in known and any(figure in data.data_vars for data in groups.values())):
         from mdr_dask.plots.view import figure_of
 
-        found = figure_of(groups, figure, **view)
+        found = figure_of(groups, figure, over, by, panels, log)
     else:
         found = _named(known, figure, f"figure of {model}")
-    drawn: Figure = found.figure(selection.select_all(groups, _several(select)))
+    groups = selection.select_all(groups, _several(select))
+    groups = selection.where_all(groups, where) if where else groups
+    if measured is not None:
+        from mdr_dask.plots.measured import with_points
+
+        groups, figures = with_points(groups, {figure: found}, measured)
+        found = figures[figure]
+    with page.drawing_for(page.requested(size, title, style, units)):
+        drawn: Figure = found.figure(groups)
     return drawn
 
 
@@ -369,17 +397,17 @@ class StudyAccessor:
         """Return means with their errors as a table: `mdr_dask.table` of this study."""
         return table(self._dataset, outputs, **asked)
 
-    def aggregate(self, **asked: Any) -> xr.Dataset:
+    def aggregate(self, *outputs: str, **asked: Any) -> xr.Dataset:
         """Compute statistics over realisations: `mdr_dask.aggregate` of this study."""
-        return aggregate(self._dataset, **asked)
+        return aggregate(self._dataset, outputs, **asked)
 
     def fit(self, law: str, **asked: Any) -> xr.Dataset | xr.DataTree:
         """Fit a law: `mdr_dask.fit` of this study."""
         return fit(self._dataset, law, **asked)
 
-    def plot(self, figure: str, select: Words = (), **view: Any) -> Figure:
+    def plot(self, figure: str, select: Words = (), **asked: Any) -> Figure:
         """Draw a figure: `mdr_dask.plot` of this study."""
-        return plot(self._dataset, figure, select, **view)
+        return plot(self._dataset, figure, select, **asked)
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:

@@ -97,8 +97,8 @@ def axis_range(axis: Axis, unit: str, written: str = "") -> str:
     """Return the values of an axis, or their range and number: ``1 mN to 100 N, 20 values, geometric``."""
     count = len(axis.values)
     if axis.refinement is not None:
-        ends = [shown(value, unit, written=written) for value in (axis.values[0], axis.values[-1])]
-        return f"{ends[0]} to {ends[1]}, {_adaptive(axis.refinement, count)}"
+        low, high = (shown(value, unit, written=written) for value in (axis.values[0], axis.values[-1]))
+        return f"{low} to {high}, {_adaptive(axis.refinement, count)}"
     if axis.labels is not None:
         more = f", ... ({count} values)" if count > LISTED else ""
         return ", ".join(axis.labels[:LISTED]) + more

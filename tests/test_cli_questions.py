@@ -12,7 +12,10 @@ import pytest
 import xarray as xr
 from planted import ROLLERS, SLIDING, make
 
+from mdr_dask import aggregate
 from mdr_dask.cli import main
+from mdr_dask.cli.answers import print_answer
+from mdr_dask.questions.table import Table
 
 ASKED = ("friction_coefficient", "--where", "velocity > 5 mm/s", "--sort", "-friction_coefficient")
 COLUMNS = ["normal_force", "velocity", "friction_coefficient_mean", "friction_coefficient_standard_error"]
@@ -76,7 +79,7 @@ def test_every_form_holds_the_same_rows(study, expected, tmp_path, capsys):
 def test_printed_tables_are_limited_and_count_the_other_rows(study, expected, capsys):
     streams = output(capsys, "show", study, *ASKED, "--limit", "3")
     lines = rows(streams.out)
-    assert "in all rows: realisations = 4, status = done" in " ".join(streams.out.split())
+    assert "in these rows: realisations = 4, status = done" in " ".join(streams.out.split())
     assert [float(line.split()[0]) for line in lines] == expected[:3, 0].tolist()
     assert all(" +- " in line for line in lines)
     assert streams.err == f"... {len(expected) - 3} more rows (--limit 0 prints all)\n"
@@ -140,6 +143,41 @@ def test_a_study_with_series_lists_them(tmp_path, capsys):
         assert main([command, store]) == 2
         assert capsys.readouterr().err == "expected --series with one of a, b, because this study has series\n"
     assert len(rows(output(capsys, "show", store, "rms_slope", "--series", "a").out)) == 2
+
+
+@pytest.mark.parametrize(
+    ("call", "told"), [("show STORE --columns a/b", "formulas"), ("plot STORE a/b", "no store, figure")]
+)
+def test_a_formula_is_refused_where_a_name_is_expected(study, capsys, call, told):
+    assert main(call.replace("STORE", study).split()) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_names_of_outputs_and_laws_have_every_form(study, capsys):
+    both = output(capsys, "show", study, "rms_slope,friction_coefficient", "--csv").out
+    assert both == output(capsys, "show", study, "rms_slope", "friction_coefficient", "--csv").out
+    assert "zone_one" in {row["law"] for row in json.loads(output(capsys, "fit", study, "--json").out)["rows"]}
+
+
+def test_without_h5py_netcdf_is_one_message_and_no_file(study, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("mdr_dask.store.reading.find_spec", lambda name: None if name == "h5py" else name)
+    path = tmp_path / "means.nc"
+    assert main(["show", study, "-o", str(path)]) == 2
+    assert "mdr_dask[netcdf]" in capsys.readouterr().err
+    assert not path.exists()
+
+
+def test_means_from_python_can_be_written_to_netcdf(study, tmp_path):
+    path = tmp_path / "means.nc"
+    aggregate(study).to_netcdf(path)
+    with xr.open_dataset(path) as found:
+        assert "friction_coefficient_mean" in found
+
+
+def test_an_error_that_is_zero_in_all_rows_is_not_printed(capsys):
+    frame = pd.DataFrame({"a_mean": [1.0, 2.0], "a_standard_error": [0.0, 1e-17], "a_grid_error": [0.0, 0.5]})
+    print_answer(Table(iter([frame]), dict.fromkeys(frame, "m"), 2, 0), "table", 0, True)
+    assert capsys.readouterr().out.split("\n")[0] == "mean +- grid error"
 
 
 def test_without_pyarrow_parquet_is_one_message_and_no_file(study, tmp_path, capsys, monkeypatch):

@@ -39,7 +39,7 @@ def test_no_line_is_wider_than_the_terminal(printed, columns, rows):
 def test_constant_columns_are_printed_above_the_table(printed):
     columns = [[1.0, 2.0], ["0.1 +- 0.01", "0.2 +- 0.01"], [float("nan")] * 2, [20, 20], ["done", "done"]]
     note, missing, *_, last = printed(NAMES, columns)
-    assert note == "in all rows: realisations = 20, status = done; not known:"
+    assert note == "in these rows: realisations = 20, status = done; not known:"
     assert missing.strip() == "wear_volume_of_the_first_body"
     assert last.split() == ["2", "0.2", "+-", "0.01"]
     assert not any("nan" in line for line in printed(NAMES, columns))

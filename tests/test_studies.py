@@ -170,7 +170,10 @@ def test_exceptions_have_the_messages_of_the_command_line(call, error, message):
 UNFIT = [
     (lambda study: mdr_dask.fit(study, "zone_on"), "no law for sliding_friction is called 'zone_on'"),
     (lambda study: mdr_dask.plot(study, "stribeck"), "no figure of sliding_friction is called 'stribeck'"),
-    (lambda study: mdr_dask.aggregate(study, "medan"), "no statistic is called 'medan' (did you mean 'mean'?)"),
+    (
+        lambda study: mdr_dask.aggregate(study, statistics="medan"),
+        "no statistic is called 'medan' (did you mean 'mean'?)",
+    ),
     (lambda study: mdr_dask.plot(xr.Dataset(), "velocity"), "expected a study as returned by run or open_study"),
     (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps a single"),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
@@ -186,9 +189,9 @@ def test_invalid_datasets_and_names_are_one_message(call, message, study):
 
 def test_a_string_is_accepted_instead_of_a_sequence(study):
     parts = {"select": "velocity=1 mm/s", "group_by": "normal_force", "columns": "load_number"}
-    one = mdr_dask.aggregate(study, "mean", **parts)
+    one = mdr_dask.aggregate(study, statistics="mean", **parts)
     xr.testing.assert_identical(
-        one, mdr_dask.aggregate(study, ["mean"], **{key: [word] for key, word in parts.items()})
+        one, mdr_dask.aggregate(study, statistics=["mean"], **{key: [word] for key, word in parts.items()})
     )
     assert "friction_coefficient_mean" in one
     assert "friction_coefficient_standard_error" not in one

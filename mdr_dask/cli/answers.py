@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from mdr_dask.cli.options import tell
-from mdr_dask.cli.printing import print_aligned, print_left, titled, with_error, with_interval
+from mdr_dask.cli.printing import ROUNDING, print_aligned, print_left, titled, with_error, with_interval
 from mdr_dask.cli.writing import require_suffix, writing
 from mdr_dask.errors import DataError
 
@@ -108,7 +108,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors (``0.1234 +- 0.0005``) or its interval (``0.1234 (0.1220, 0.1240)``).
 
-    An error is left out if it is unknown in all rows. The returned text names the errors that are printed.
+    An error is left out if it is unknown or zero in all rows. The returned text names the errors that are printed.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}
@@ -120,7 +120,8 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
             errors = [f"{output}_{part}" for part in ("standard_error", "grid_error") if f"{output}_{part}" in columns]
             ends = [f"{output}_{part}" for part in ("low", "high") if f"{output}_{part}" in columns]
             left_out |= {*errors, *ends}
-            parts = [each for each in errors or ends if each in known]
+            parts = [each for each in ends if each in known]
+            parts += [each for each in errors if _is_shown(columns[each], values)]
             join = with_interval if ends else with_error
             joined[output] = [join(*each) for each in zip(values, *(columns[part] for part in parts), strict=True)]
             if errors and parts:
@@ -138,6 +139,10 @@ def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""
     return "; ".join(f"{output}{''.join(kind)}" for output, kind in kinds.items())
+
+
+def _is_shown(errors: Sequence[float], means: Sequence[float]) -> bool:
+    return any(error > ROUNDING * abs(mean) for error, mean in zip(errors, means, strict=True))
 
 
 def _is_known(value: Any) -> bool:

@@ -153,7 +153,7 @@ def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
     from mdr_dask.store import is_study
 
     def is_place(word: str) -> bool:
-        return "/" in word or word.endswith(".zarr") or is_study(word)
+        return word.endswith(".zarr") or is_study(word)
 
     count = next((k for k, word in enumerate(words) if k and not is_place(word)), len(words))
     return list(words[:count]), list(words[count:])
@@ -205,7 +205,9 @@ def _requested(
     outputs = _outputs_of(groups)
     if given and (fixed := [name for name in names if name in known and name not in outputs]):
         raise click.UsageError(f"--{given[0]} needs an output; the axes of the figure {fixed[0]} are fixed")
-    require_known(of_outputs, outputs if given else [*known, *outputs], "output" if given else "figure or output")
+    require_known(
+        of_outputs, outputs if given else [*known, *outputs], "output" if given else "store, figure or output"
+    )
     ending = f"-over-{'-'.join(axes['over'])}" if axes["over"] else "-effects" if axes["effects"] else ""
     return {
         f"{name}{ending}" if name in of_outputs else name: _of_output(name, groups, axes)

@@ -70,7 +70,10 @@ def fit(
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
-        print_named([(name, law.summary) for name, law in known.items()])
+        if form:
+            print_rows([{"law": name, "summary": law.summary} for name, law in known.items()], {}, form)
+        else:
+            print_named([(name, law.summary) for name, law in known.items()])
         return
     require_known(names, list(known), f"law for {model}")
     if (measured or figure) and names != ("calibration",):

@@ -24,7 +24,8 @@ def _units(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> dic
     return parse_units(texts)
 
 
-def _listed(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
+def listed(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names in texts; a text may contain several names, separated by commas."""
     return tuple(name.strip().replace(".", "_") for text in texts for name in text.split(",") if name.strip())
 
 
@@ -112,7 +113,7 @@ _QUESTION = (
     click.option(
         "--group-by",
         multiple=True,
-        callback=_listed,
+        callback=listed,
         metavar="AXIS,...",
         help="One row for each combination of values of these axes, averaged over all other axes.",
     ),
@@ -125,7 +126,7 @@ _QUESTION = (
     click.option(
         "--columns",
         multiple=True,
-        callback=_listed,
+        callback=listed,
         metavar="NAME,...",
         help="Show only these columns: axes, parameters, outputs, dimensionless numbers, realisations, status.",
     ),

@@ -97,7 +97,7 @@ def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys:
             f"{_name(title)} = {cell}{_unit(title)}".replace(" ", _BLANK) for title, cell in fixed if cell != UNKNOWN
         ]
         missing = [_name(title) for title, cell in fixed if cell == UNKNOWN]
-        note += f"{'; ' if note else ''}in all rows: {', '.join(known)}" if known else ""
+        note += f"{'; ' if note else ''}in these rows: {', '.join(known)}" if known else ""
         note += f"{'; ' if note else ''}not known: {', '.join(missing)}" if missing else ""
         keys = sum(not alike for alike in same[:keys])
         titles = [title for title, alike in zip(titles, same, strict=True) if not alike]

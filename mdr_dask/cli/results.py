@@ -11,6 +11,7 @@ import click
 from mdr_dask.cli.answers import check_target, print_answer, write_answer
 from mdr_dask.cli.options import (
     json_option,
+    listed,
     question_options,
     tell,
 )
@@ -83,7 +84,7 @@ def _print_counts(study: dict[str, Any], rows: list[dict[str, Any]], at_work: li
 
 @click.command(cls=Reading)
 @store_argument
-@click.argument("outputs", nargs=-1)
+@click.argument("outputs", nargs=-1, callback=listed)
 @click.option(
     "--statistic", type=click.Choice(STATISTICS), multiple=True, help="Statistic over realisations; may be repeated."
 )
@@ -108,7 +109,7 @@ def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: 
 
 @click.command(cls=Reading)
 @store_argument
-@click.argument("outputs", nargs=-1)
+@click.argument("outputs", nargs=-1, callback=listed)
 @click.option(
     "--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these statistics; may be repeated."
 )

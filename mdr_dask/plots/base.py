@@ -47,7 +47,8 @@ class Plot:
                 raise
             problem = f"{type(error).__name__}: {error}"
             raise DataError(f"internal error in this figure; please report it with the campaign: {problem}") from error
-        figure.leave_out(_without_value(groups))
+        every = [data["status"] for data in groups.values() if "status" in data]
+        figure.leave_out(_without_value(every if figure.states is None else figure.states))
         return figure
 
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Drawn:
@@ -66,15 +67,12 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])
 
 
-def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
+def _without_value(states: Sequence[xr.DataArray]) -> list[str]:
     """Return up to three texts: the numbers of results that failed, that did not converge, and that are missing."""
-    states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in reasons.items()}
-    return [
-        f"{count} of {total} results of the store, because they {words}" for words, count in counts.items() if count
-    ]
+    return [f"{count} of {total} results, because they {words}" for words, count in counts.items() if count]
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:

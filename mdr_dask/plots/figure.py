@@ -143,6 +143,8 @@ class Figure:
     stack: int = 1
     ratio: float = 0.7
     share_y: bool = False
+    #: States of the results that belong to the figure. None stands for all results of the series.
+    states: Sequence[xr.DataArray] | None = None
 
     def leave_out(self, sentences: Iterable[str]) -> None:
         """Add texts about results that are not drawn. Empty texts and texts that are already present are ignored."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -25,7 +26,7 @@ NAME = "measured"
 
 
 def with_points(
-    groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
+    groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: Any
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
     """Return the series with the table of measurements in `file`, and the figures with the points of this table."""
     given = with_table(groups, file)

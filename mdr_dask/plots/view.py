@@ -252,6 +252,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
         panel.traces += _guides(view.guides.get(output, {}), panel)
     every = [one for part in families for one in part.values()]
     figure = Figure(panels, "", share_y=len(panels) > 1, ratio=0.3 if view.apart else 0.7)
+    figure.states = [curve.data["status"] for one in every for curve in one.curves if "status" in curve.data]
     figure.fixed = curves.fixed_text(curves.fixed_by_all([one.held for one in every]), first)
     figure.bars = curves.meaning_of_bars(found.values(), [output])
     figure.leave_out([*left_out, *(sentence for one in every for sentence in one.left_out)])
@@ -435,6 +436,7 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
             panels[-1].traces.append(Trace("curve", missing, "no value", "no value", "#606060", "", "x"))
             panels[-1].keys = [Key("no value", "#606060", "", "x")]
     figure = Figure(panels, "", share_y=len(panels) > 1)
+    figure.states = [data["status"] for _, data, _ in drawn if "status" in data]
     figure.fixed = curves.fixed_text(curves.fixed_by_all([curves.scalars(data) for _, data, _ in drawn]), drawn[0][1])
     half = np.concatenate([np.ravel(value.high - value.low) / 2 for _, _, value in drawn])
     unit = labels.printed_unit(labels.quantity(output, drawn[0][1][output]).unit)

@@ -115,6 +115,8 @@ class Columns:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
             return DataError(f"{name} is {self._numbers[name].formula}: the study lacks {missing}")
+        if not name.isidentifier():
+            return DataError(f"expected the name of a column, got {name!r}; formulas are for --where and --sort")
         hint = did_you_mean(name, self.known) or f"; known: {', '.join(self.known)}"
         return DataError(f"no column {name!r}{hint}")
 
@@ -128,9 +130,12 @@ class Columns:
         if name != STATUS or found is None:
             return found
         number = counts(self.dataset)
-        unfinished = [state for state in Status if state not in COMPLETE]
-        each = [xr.where(number.isel(state=state, drop=True) > 0, WORDS[state], "") for state in unfinished]
-        return xr.concat([found, *each], ALTERNATIVES, coords="minimal", compat="override")
+        words = [found]
+        for state in (state for state in Status if state not in COMPLETE):
+            there = number.isel(state=state, drop=True).to_numpy() > 0
+            words.append(found.copy(data=np.where(there, WORDS[state], "").astype(object)))
+        joined: xr.DataArray = xr.concat(words, ALTERNATIVES, coords="minimal", compat="override")
+        return joined
 
     def _value(self, text: str, find: Find) -> Value:
         expression = parse(text)

@@ -81,21 +81,28 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     return dataset[order].drop_vars(inner & dataset.coords.keys())
 
 
-def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
-
-    Lazy arrays are written piece by piece. Attributes that are neither texts nor numbers are written as JSON texts.
-    """
+def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a copy whose attributes fit into netCDF: those that are neither texts nor numbers become JSON texts."""
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
         if value is not None and name != "mdr_dask_layout"  # without it, no run can extend the copy
     }
+    return plain
+
+
+def save(dataset: xr.Dataset, path: Path) -> None:
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
+
+    Lazy arrays are written piece by piece.
+    """
+    plain = with_plain_attributes(dataset)
     if path.suffix == ".nc":
-        if find_spec("h5netcdf") is None:
+        if not (find_spec("h5netcdf") and find_spec("h5py")):
             raise StoreError(
-                f"{path}: netCDF needs h5netcdf: pip install 'mdr_dask[netcdf]', or choose a name that ends in .zarr"
+                f"{path}: netCDF needs h5netcdf and h5py: pip install 'mdr_dask[netcdf]', "
+                "or choose a name that ends in .zarr"
             )
         plain.to_netcdf(path, engine="h5netcdf")
         return

@@ -253,6 +253,16 @@ def test_means_without_failed_realisations_are_marked_and_counted(groups):
     assert counts.max() == most
 
 
+@pytest.mark.parametrize("over", ["velocity", ("velocity", "normal_force")])
+def test_failed_results_of_cases_that_are_not_drawn_are_not_counted(groups, over):
+    data = groups[""].load()
+    status = data["status"].copy()
+    status[{"normal_force": 1, "velocity": 3, "hurst": [0, 1], "realisation": 0}] = Status.FAILED.value
+    view = {"by": "normal_force"} if over == "velocity" else {}
+    figure = described({"": data.assign(status=status)}, MU, over, **view)
+    assert f"1 of {status.size // 2} results, because they failed" in figure.left_out
+
+
 def test_warnings_of_results_are_in_figure_and_table(groups):
     figure = described(groups, MU, "velocity")
     figure.warnings = ["3 results of the store: outside the range tested"]
