@@ -10,6 +10,7 @@ import xarray as xr
 
 from mdr_dask.plots import colours
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.plots.measured import HALF
 
 if TYPE_CHECKING:
     from mdr_dask.models.parts.surface_report import FileReport
@@ -29,7 +30,8 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
     no noise.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
-    areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True))
+    densities = np.concatenate([report.bins.density[report.bins.density > 0] for report in reports])
+    areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True, low=densities.min() / 10, high=densities.max() * 10))
     line = Panel(q, Axis("spectrum of a line [m$^3$]", log=True))
     for k, (report, used) in enumerate(zip(reports, spectra, strict=True)):
         file, colour = xr.Dataset(coords={"file": Path(report.file.name).name}), colours.colour(k)
@@ -48,7 +50,8 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
             law = f"power law, H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})"
             areal.keys.append(Key(law, "#000000", "--"))
     line.keys = [key for key in line.entries() if key.label != METHOD or key.colour == colours.colour(0)]
-    line.keys = [Key(METHOD, "#000000", "-") if key.label == METHOD else key for key in line.keys]
+    if len(reports) > 1:
+        line.keys = [Key(METHOD, "#000000", "-") if key.label == METHOD else key for key in line.keys]
     rms, gradient = (
         np.sqrt(np.mean([value**2 for value in values]))
         for values in zip(*((used.rms_height(), used.rms_gradient()) for used in spectra), strict=True)
@@ -63,8 +66,9 @@ def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) ->
     spectrum, bins = report.found.spectrum, report.bins
     raw = columns(file, x=spectrum.wavenumber, y=spectrum.density)
     there = bins.density > 0
-    q, density, error = (each[there] for each in (bins.wavenumber, bins.density, bins.density * bins.error))
-    ends = columns(file, x=q, y=Mean(density, density - error, density + error))
+    q, density = bins.wavenumber[there], bins.density[there]
+    factor = np.exp(HALF * bins.error[there])
+    ends = columns(file, x=q, y=Mean(density, density / factor, density * factor))
     inside = columns(file, x=used.wavenumber, y=used.density)
     found = [
         Trace("law", raw, "spectrum as measured", "", "#c0c0c0", "-"),

@@ -46,12 +46,14 @@ COLUMNS = (
 class Found(NamedTuple):
     """The spectrum C2D of a file within the range of the data.
 
-    `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found.
+    `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found. `error` contains
+    the standard errors of log C2D if the spectrum was computed from that of straight profiles.
     """
 
     spectrum: Spectrum
     resolution: float = 0.0
     remarks: tuple[str, ...] = ()
+    error: FloatArray | None = None
 
 
 class Files(NamedByFile):
@@ -160,12 +162,13 @@ def _tabulated(file: DataFile) -> Found:
     q = table["wavenumber"] if "wavenumber" in table else 2 * np.pi / table["wavelength"]
     order = np.argsort(q)
     q, density = q[order], table[kinds[0]][order]
+    error = None
     with file.in_errors():
         if kinds == ["C cut"]:
-            spectrum = of_cut(averaged(q, density, CUT_ERROR**-2))
+            spectrum, error = of_cut(averaged(q, density, CUT_ERROR**-2))
         else:
             spectrum = Spectrum(q, density / (np.pi * q) if kinds == ["C1D"] else density)
-    return Found(spectrum, remarks=(table.remark,) if table.remark else ())
+    return Found(spectrum, remarks=(table.remark,) if table.remark else (), error=error)
 
 
 @lru_cache(maxsize=64)
@@ -222,9 +225,9 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
     with file.in_errors():
         cut = cut_of_lines([line], scans.window == "hann")
         limit = noise_limit(cut, NOISE_SLOPE, NOISE_TAIL)
-        spectrum = of_cut(cut.until(limit))
+        spectrum, error = of_cut(cut.until(limit))
     remarks = (*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend))
-    return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, remarks)
+    return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, remarks, error)
 
 
 @lru_cache(maxsize=16)

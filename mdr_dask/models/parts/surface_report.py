@@ -11,11 +11,10 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, anisotropic, levelled_map, line_of_scan
 from mdr_dask.physics.surfaces.measured import rms_slope
-from mdr_dask.physics.surfaces.scans import averaged, cut_of_lines, hann_window
+from mdr_dask.physics.surfaces.scans import Cut, averaged, cut_of_lines, hann_window
 from mdr_dask.physics.surfaces.self_affine import SelfAffine, fit_self_affine, steep_limit
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.surfaces.scans import Cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 UNITS = {
@@ -52,9 +51,9 @@ ends of its 95 % confidence interval (`_low` and `_high`).
 class FileReport(NamedTuple):
     """Report on one file.
 
-    `row` contains a value for each name in `UNITS`. `bins` contains C2D and its relative error in logarithmic bins.
-    `cuts` contains the wave numbers and the power spectrum, in m^3, of straight profiles along "x", and for a map along
-    "y" too. `law` is the fitted power law, or None if no power law fits.
+    `row` contains a value for each name in `UNITS`. `bins` contains C2D and the standard error of log C2D. `cuts`
+    contains the wave numbers and the power spectrum, in m^3, of straight profiles along "x", and for a map along "y"
+    too. `law` is the fitted power law, or None if no power law fits.
     """
 
     file: DataFile
@@ -75,11 +74,14 @@ def _report(surface: Surface, file: DataFile, found: Found) -> FileReport:
     row: dict[str, float | str] = {name: float("nan") for name in UNITS} | {"file": file.name}
     row |= {"rms_gradient": found.spectrum.rms_gradient()}
     cuts: dict[str, tuple[FloatArray, FloatArray]] = {}
-    bins = averaged(found.spectrum.wavenumber, found.spectrum.density, 100.0)
+    if found.error is None:
+        bins = averaged(found.spectrum.wavenumber, found.spectrum.density, 100.0)
+    else:  # the last wave number is beyond the data
+        bins = Cut(*(column[:-1] for column in (found.spectrum.wavenumber, found.spectrum.density, found.error)))
     if surface.map is not None:
         bins, cuts = _of_map(surface.map, file, row, bins)
     elif surface.scan is not None:
-        bins, cuts = _of_scan(surface.scan, file, row, found)
+        cuts = _of_scan(surface.scan, file, row)
     end = 2 * np.pi / found.resolution if found.resolution else np.inf
     isotropic = surface.map is None or not anisotropic(surface.map, file)
     law = fit_self_affine(bins.until(min(end, steep_limit(bins)))) if isotropic else None
@@ -103,16 +105,12 @@ def _of_map(
     return rings.binned() if maps.direction is None else bins, dict(zip("xy", rings.cuts, strict=True))
 
 
-def _of_scan(
-    scans: ScanFiles, file: DataFile, row: dict[str, float | str], found: Found
-) -> tuple[Cut, dict[str, tuple[FloatArray, FloatArray]]]:
+def _of_scan(scans: ScanFiles, file: DataFile, row: dict[str, float | str]) -> dict[str, tuple[FloatArray, FloatArray]]:
     line = line_of_scan(scans, file)
     cut = cut_of_lines([line], scans.window == "hann")
     row |= {"Pq": float(line.height.std())}
     row |= {"slope_x": rms_slope(line.height * hann_window(line.height.size), line.length), "length": line.length}
-    known = cut.wavenumber <= found.spectrum.wavenumber[-1]
-    kept = cut.until(float(cut.wavenumber[known][-1]))
-    return kept._replace(density=found.spectrum.at(kept.wavenumber)), {"x": (cut.wavenumber, cut.density)}
+    return {"x": (cut.wavenumber, cut.density)}
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -87,8 +87,10 @@ def _until_the_end(cut: Cut) -> slice:
     return slice(0, int(falls[0]) + 1 if falls.size else None)
 
 
-def of_cut(cut: Cut) -> Spectrum:
-    """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
+def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
+    """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform), and its errors.
+
+    The errors are standard errors of log C2D. They are large below the roll-off, where C2D hardly changes the cut.
 
     C2D, a power law between adjacent wave numbers of the cut, is found by a least-squares fit. The fit amplifies noise
     less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the slope d log C2D /
@@ -121,5 +123,6 @@ def of_cut(cut: Cut) -> Spectrum:
         return np.concatenate([rows / error[:, None], bends])
 
     start = np.log(np.append(density, density[-1] * (q[-1] / edge) ** 3) / (np.pi * knots))
-    logs = optimize.least_squares(residual, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x
-    return Spectrum(knots, np.exp(logs))
+    fit = optimize.least_squares(residual, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12)
+    covariance = np.linalg.inv(fit.jac.T @ fit.jac)
+    return Spectrum(knots, np.exp(fit.x)), np.sqrt(np.diag(covariance))

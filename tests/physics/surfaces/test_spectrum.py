@@ -79,12 +79,23 @@ def test_scans_give_back_the_spectrum(hurst):
     spectrum = self_affine(hurst, LENGTH / 4, LENGTH / 128, 1e-6)
     height = areal_surface(spectrum, (1024, 1024), (LENGTH, LENGTH), 6, 1)
     cut = cut_of_lines([MeasuredLine(height[k], LENGTH) for k in range(0, 1024, 16)])
-    found = of_cut(cut)
+    found, _ = of_cut(cut)
     inner = (cut.wavenumber > 2 * np.pi / LENGTH * 8) & (cut.wavenumber < 2 * np.pi / LENGTH * 100)
     scatter = np.log(found.at(cut.wavenumber[inner]) / spectrum.at(cut.wavenumber[inner]))
     assert np.sqrt(np.mean(scatter**2)) < 0.05 + 3 * np.sqrt(np.mean(cut.error[inner] ** 2))
     slope, wanted = (np.sqrt(np.sum((one.line(LENGTH, 511) * waves(511)) ** 2) / 2) for one in (found, spectrum))
     assert slope == pytest.approx(wanted, rel=0.05)
+
+
+def test_errors_of_a_single_scan_hold_above_and_below_the_rolloff():
+    spectrum = self_affine(0.8, LENGTH, LENGTH / 128, 1e-6, LENGTH / 16)
+    height = areal_surface(spectrum, (1024, 1024), (LENGTH, LENGTH), 6, 1)
+    apart = []
+    for row in range(0, 1024, 64):
+        found, error = of_cut(cut_of_lines([MeasuredLine(height[row], LENGTH)]))
+        kept = (found.wavenumber > spectrum.wavenumber[0]) & (found.wavenumber < 2 * np.pi / LENGTH * 100)
+        apart.append(np.log(found.density[kept] / spectrum.at(found.wavenumber[kept])) / error[kept])
+    assert np.mean(np.abs(np.concatenate(apart)) < 1.96) > 0.9
 
 
 @pytest.mark.parametrize(
