@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.errors import DataError, similar
 from mdr_dask.headings import Column, factors, fits, is_called, match, nearest, plain, split_unit
 from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
@@ -43,7 +43,7 @@ _DECIMALS = {
     for mark, other in (".,", ",.")
 }
 _NUMBER = re.compile(rf"(?=.{{1,60}}\Z)(?:{_DECIMALS['.']}|{_DECIMALS[',']})")
-_TEMPERATURE = r"([+-]?\d+(?:[.,]\d+)?)\s*(°\s?[CF]|deg[CF]|K)\b"
+_TEMPERATURE = r"([+-]?\d+(?:[.,]\d+)?)[\s\[(]*(°\s?[CF]|deg[CF]|[CFK])\b"
 _STATED = re.compile(rf"(?<![a-z])t(?:emp[a-z]*)?\.?\s*[=:]?\s*{_TEMPERATURE}", re.IGNORECASE)
 _MISSING = re.compile(
     r"(?=.{0,20}\Z)[\s.,/*#_<>–—-]*(n[\s.,/]*a[.,]?n?|no[\s_]*data|null|none)?[\s.,/*#_<>–—-]*", re.IGNORECASE
@@ -132,6 +132,17 @@ class Read(dict[str, FloatArray]):
     remark: str = ""
     unused: Mapping[str, tuple[str, FloatArray]] = {}
 
+    def leave_out_incomplete(self) -> None:
+        """Leave out the rows in which a number is missing, and count them in `remark`."""
+        known = np.isfinite(np.array([*self.values()])).all(axis=0)
+        if known.all():
+            return
+        for name, column in self.items():
+            self[name] = column[known]
+        self.lines = tuple(line for line, is_known in zip(self.lines, known, strict=True) if is_known)
+        missing = f"rows without a number are left out: {np.count_nonzero(~known)}"
+        self.remark = "; ".join(filter(None, (self.remark, missing)))
+
 
 def is_table(path: str | Path) -> bool:
     """Return whether a path is a file that may contain a table: any file except a campaign and a published study."""
@@ -170,20 +181,32 @@ def _workbook(content: bytes, source: str) -> str:
     except Exception as error:  # openpyxl and zipfile raise many kinds of errors for damaged files
         raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None
     lines = []
+    texts = [" ".join(cell.split()) for sheet in sheets.values() for cell in sheet.to_numpy().flat if type(cell) is str]
+    kinds = {kind for text in texts if len(kind := _decimals(text)) == 1}
     for name, sheet in sheets.items():
-        frame = sheet.fillna("").map(_of_workbook)
+        frame = sheet.fillna("").map(lambda cell: _of_workbook(cell, kinds))
         lines += [SHEET + str(name), *("\t".join(row) for row in frame.to_numpy())]
     return "\n".join(lines)
 
 
-def _of_workbook(cell: object) -> str:
-    """Return a cell as text on one line.
+def _decimals(text: str) -> str:
+    """Return the marks that may be the decimal mark of a number: ``,`` for 30,0, and both for 3,158."""
+    return "".join(mark for mark, form in _DECIMALS.items() if re.fullmatch(form, text))
 
-    A decimal comma in a text such as ``30,0`` becomes a decimal point, because numbers of a workbook have one.
+
+def _of_workbook(cell: object, kinds: set[str]) -> str:
+    """Return a cell as text on one line. `kinds` are the decimal marks that are certain in other texts of the workbook.
+
+    A decimal comma in a text such as ``30,0`` becomes a decimal point, because numbers of a workbook have one. A text
+    such as ``3,158`` is only a number if the decimal mark of other texts is certain.
     """
     text = " ".join(str(cell).split())
-    is_decimal = re.fullmatch(_DECIMALS[","], text) and not re.fullmatch(_DECIMALS["."], text)
-    return text.replace(".", "").replace(",", ".") if isinstance(cell, str) and is_decimal else text
+    kind = _decimals(text) if isinstance(cell, str) else ""
+    if len(kind) == 2 and re.search("[.,]", text):
+        if len(kinds) != 1:
+            return f"{text} (as text, with an uncertain decimal mark)"
+        (kind,) = kinds
+    return text.replace(".", "").replace(",", ".") if kind == "," else text
 
 
 def _lines(text: str) -> list[Line]:
@@ -234,9 +257,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     """Find the names, the units and the lines of numbers of a table.
 
     Text above the names and below the numbers is left out. A table may consist of several blocks of numbers, each below
-    the same line of names. If a temperature is stated above each block, the temperatures become a further column. If
-    the table consists of pairs of columns with a temperature above each pair, it becomes a table of three columns. For
-    a table whose cells may be words, the caller gives `is_name`, which returns whether a text is the name of a column.
+    the same line of names. If a temperature is stated above each block, the temperatures become a further column. Also
+    groups of columns side by side, with the same names and a temperature above each group, become one table. For a
+    table whose cells may be words, the caller gives `is_name`, which returns whether a text is the name of a column.
     """
     grid = _grid(source, _lines(text))
     head = _head_of_words(grid, is_name) if is_name else _head(grid)
@@ -246,9 +269,11 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     cells = _with_points(grid, rows)[:, : len(units)]
     first = grid.lines[rows[0] if head.names is None else head.names]
     sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, notes)
-    known = [plain(name) for name in names]
-    if len(names) >= 4 and known == known[:2] * (len(names) // 2):
-        return _from_pairs(grid, sheet, head.labels)
+    places = [place for place, name in enumerate(names) if name or cells[:, place].any()]
+    known = [(plain(names[place]), units[place]) for place in places]
+    for count in range(2, len(known) // 2 + 1):
+        if known == known[:count] * (len(known) // count):
+            return _from_groups(grid, sheet, head.labels, np.reshape(places, (-1, count)))
     if not names or not all(stated) or any(is_called(name, "temperature") for name in names):
         return sheet
     temperatures, of_temperature = zip(*(each for each in stated if each), strict=True)
@@ -330,8 +355,9 @@ def _head(grid: _Grid) -> _Head:
     """Find the names and units in the lines of text above the numbers.
 
     Only lines with as many cells as most lines of numbers are considered; if there is no such line, the last line above
-    the numbers contains the names. If a considered line other than the first contains units, the names are in the
-    considered line above it. Otherwise the last considered line contains the names, and the one above it may be units.
+    the numbers contains the names. If the last considered line has names with units, no other line has units of these
+    columns. If a considered line other than the first contains units, the names are in the considered line above it.
+    Otherwise the last considered line contains the names, and the one above it may be units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -345,7 +371,9 @@ def _head(grid: _Grid) -> _Head:
         return _Head(None, None, None, begin, numeric, data)
     wide = [row for row in above if grid.length[row] == numeric.size] or above[-1:]
     units = next((row for row in wide[:0:-1] if _are_units(grid.cells[row])), None)
-    if units is not None:
+    if units != wide[-1] and any(unit and is_unit(unit) for _, unit in map(split_unit, grid.cells[wide[-1]])):
+        units = None
+    elif units is not None:
         wide = wide[: wide.index(units)]
     elif len(wide) > 1 and _are_units(grid.cells[wide[-2]]):
         units = wide.pop(-2)
@@ -420,7 +448,7 @@ def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | N
 def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
     """Return the last temperature in lines of text, with its unit, or None if they contain no temperature."""
     found = [each for row in rows for each in _STATED.finditer(" ".join(grid.cells[row]))]
-    return (found[-1][1].replace(",", "."), found[-1][2].replace(" ", "")) if found else None
+    return (found[-1][1].replace(",", "."), in_degrees(found[-1][2].replace(" ", ""))) if found else None
 
 
 def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -480,24 +508,31 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
     return cells
 
 
-def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
-    """Convert pairs of columns with a temperature in the label above each pair into the three columns of a table."""
-    count = len(sheet.names) // 2
-    above = [] if labels is None else [cell for cell in grid.cells[labels] if cell]
-    known = [found for cell in above if (found := re.match(r"\D*?([+-]?\d+(?:[.,]\d+)?)[\s\])(\[]*([^\])]*)", cell))]
-    if not len(known) == len(above) == count:
-        what = f"expected a temperature above each of the {count} pairs of columns, such as '20 degC'"
-        raise TableError(sheet.source, [sheet.head.problem(0, what)])
+def _from_groups(grid: _Grid, sheet: Sheet, labels: int | None, groups: IntArray) -> Sheet:
+    """Join groups of columns side by side: their rows follow one another. `groups` has the places of each group.
+
+    The temperature in the label above each group becomes a further column, unless each group has such a column.
+    """
+    names, units = ([each[place] for place in groups[0]] for each in (sheet.names, sheet.units))
+    extra: list[list[str]] = [[] for _ in groups]
+    if not any(is_called(name, "temperature") for name in names):
+        above = [] if labels is None else [cell for cell in grid.cells[labels] if cell]
+        share = len(above) // len(groups)  # number of labels of each group
+        texts = [" ".join(dict.fromkeys(above[k * share : (k + 1) * share])) for k in range(len(groups))]
+        known = [found for text in texts if (found := re.search(_TEMPERATURE, text))]
+        if not len(known) * share == len(above) > 0 or len({each[2] for each in known}) > 1:
+            what = f"expected a temperature above each of the {len(groups)} groups of columns, such as '20 degC'"
+            raise TableError(sheet.source, [sheet.head.problem(0, what)])
+        names, units = [*names, "temperature"], [*units, in_degrees(known[0][2])]
+        extra = [[each[1].replace(",", ".")] for each in known]
     filled = [
-        (line, [*two, found[1].replace(",", ".")])
-        for place, found in enumerate(known)
-        for line, two in zip(sheet.lines, sheet.cells[:, 2 * place : 2 * place + 2], strict=True)
-        if any(two)
+        (line, [*cells, *more])
+        for places, more in zip(groups, extra, strict=True)
+        for line, cells in zip(sheet.lines, sheet.cells[:, places], strict=True)
+        if any(cells)
     ]
-    lines, cells = zip(*filled, strict=True)
-    units = (*sheet.units[:2], in_degrees(known[0][2]))
-    names = (*sheet.names[:2], "temperature")
-    return replace(sheet, names=names, units=units, cells=np.array(cells, dtype=object), lines=lines)
+    lines, rows = zip(*filled, strict=True)
+    return replace(sheet, names=tuple(names), units=tuple(units), cells=np.array(rows, dtype=object), lines=lines)
 
 
 def _are_units(row: Sequence[str]) -> bool:
@@ -540,15 +575,29 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
     return found
 
 
-def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> Read:
+def read_table(
+    text: str,
+    source: str,
+    columns: Sequence[Column],
+    allow_missing: bool = False,
+    ways: Sequence[Sequence[str]] = (),
+) -> Read:
     """Read the requested columns of a table in SI, each of shape (rows,).
 
     Columns without names must be in the order of `columns`. If `allow_missing` is true, entries without a digit become
-    NaN. A TableError contains at most one problem of each column.
+    NaN. A TableError contains at most one problem of each column. `ways` are names of columns of which the table needs
+    the first, or the second, and so on. The first of the `ways` that is complete is read. The columns of the others
+    are then not used.
     """
     sheet, read, problems = read_sheet(text, source), Read(), []
     meanings = matched(sheet, columns)
     present = {column.name for column, _, _ in meanings if column is not None}
+    way = next((way for way in ways if present.issuperset(way)), None)
+    if way is not None:
+        others = {name for each in ways for name in each}.difference(way)
+        columns = [column for column in columns if column.name not in others]
+        meanings = [(each if each in columns else None, unit, is_logarithm) for each, unit, is_logarithm in meanings]
+        present -= others
     absent = [column for column in columns if column.name not in present]
     unknown = [(place, sheet.names[place]) for place, (column, _, _) in enumerate(meanings) if column is None]
     for place, name in unknown:
@@ -573,12 +622,13 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
             both = f"{sheet.names[taken[column.name]]!r} and {sheet.names[place]!r}"
             what = f"column {column.name} is given twice: {both} disagree: delete one of the two"
             problems.append(sheet.head.problem(place, what))
-    lacking = [column.name for column in absent if column.needed]
+    lacking = [f"a column {column.name}" for column in absent if column.needed]
+    lacking += [", or ".join(" and ".join(each) for each in ways)] if way is None and ways else []
     if lacking and not problems:
         got = f", got {', '.join(name for _, name in unknown)[:200]}" if unknown else ""
         if any(re.match(_TEMPERATURE, name) for _, name in unknown):
             got += " (write the temperatures into a column of their own)"
-        problems.append(sheet.head.problem(0, f"expected a column {' and a column '.join(lacking)}{got}"))
+        problems.append(sheet.head.problem(0, f"expected {' and '.join(lacking)}{got}"))
     if problems:
         raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
     unused = [name for _, name in unknown if name]

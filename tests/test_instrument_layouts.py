@@ -72,6 +72,20 @@ def test_encodings_are_found(encoding):
     assert read["temperature"][0] == pytest.approx(253.15)
 
 
+@pytest.mark.parametrize(("other", "expected"), [("0,5", 3.158), ("1,234.5", 3158.0), ("7", None)])
+def test_a_text_in_a_workbook_is_a_number_only_if_its_decimal_mark_is_certain(other, expected):
+    pytest.importorskip("openpyxl")
+    content = io.BytesIO()
+    rows = [["f [Hz]", "E' [MPa]"], [1, other], [2, "3,158"], [3, 4.5]]
+    pd.DataFrame(rows).to_excel(content, header=False, index=False)
+    text = decoded(content.getvalue(), "dma.xlsx")
+    if expected is None:
+        with pytest.raises(DataError, match="uncertain decimal mark"):
+            read_table(text, "dma.xlsx", DMA)
+    else:
+        assert read_table(text, "dma.xlsx", DMA)["storage modulus"][1] == pytest.approx(1e6 * expected)
+
+
 def test_workbooks_are_read_sheet_by_sheet():
     pytest.importorskip("openpyxl")
     content = io.BytesIO()

@@ -86,16 +86,13 @@ def read_measured(
     _require_names(read, source, conditions, axes or {})
     if is_relative and ERROR in read:
         read[ERROR] = read[ERROR] * np.abs(read[output])
-    known = np.isfinite(np.array([*read.values()])).all(axis=0)
-    missing = f"rows without a number are left out: {np.count_nonzero(~known)}" if not known.all() else ""
-    remark = "; ".join(filter(None, (read.remark, missing)))
-    rows = {name: column[known] for name, column in read.items()}
+    read.leave_out_incomplete()
+    rows = dict(read)
     values, errors = rows.pop(output), rows.pop(ERROR, None)
     if values.size < 2:
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
-    lines = tuple(line for line, is_known in zip(read.lines, known, strict=True) if is_known)
     of_errors = f"column {read.headings.get(ERROR, '')!r}{' (in % of the values)' if is_relative else ''}"
-    return Measured(source, output, values, errors, rows, lines, of_errors, remark)
+    return Measured(source, output, values, errors, rows, read.lines, of_errors, read.remark)
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
