@@ -8,7 +8,9 @@ from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.parts.material import Material, fit_error, fit_notes, solid_of
+from mdr_dask.models.parts.moduli_table import ModulusTable, one_curve
 from mdr_dask.models.parts.sliding_body import frequency_notes
+from mdr_dask.models.parts.temperature import ShiftFactors
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.solids import complex_modulus
 
@@ -126,6 +128,22 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
     np.testing.assert_allclose(close.moduli, solid.moduli, rtol=1e-6, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [("tan d", ""), ("|G*| [MPa]", "invalid"), ("Raw phase [deg]", "3"), ("Complex viscosity [Pa s]", "-1")],
+)
+def test_what_is_not_needed_and_incomplete_rows_are_left_out(tmp_path, heading, cells):
+    names, rows = "f [rad/s],G' [Pa],G'' [Pa]", [f"{f},{s},{loss}" for f, s, loss in ROWS]
+    solid = moduli(tmp_path, "\n".join([names, *rows]))
+    rows.insert(2, "0.5,---,---")
+    more = moduli(tmp_path, "\n".join([f"{names},{heading}", *(f"{row},{cells}" for row in rows)]))
+    np.testing.assert_array_equal(more.moduli, solid.moduli)
+    read = ModulusTable.model_validate(str(tmp_path / "dma.csv"))
+    used, left_out = read.notes()[0].split("; ")
+    assert used.endswith(f"not used: {heading.partition(' [')[0]}")
+    assert left_out == "rows without a number are left out: 1"
+
+
 def test_an_isotherm_may_drift_by_a_kelvin(tmp_path):
     rows = [f"{f},{s},{loss}" for f, s, loss in ROWS]
     solid = moduli(tmp_path, "f [rad/s],G' [Pa],G'' [Pa]\n" + "\n".join(rows))
@@ -194,8 +212,20 @@ def test_moduli_of_a_table_are_proportional_to_density_times_temperature(tmp_pat
 
 def test_curves_with_a_gap_are_refused_before_any_is_shifted(tmp_path):
     file = shifted_table(tmp_path / "dma.csv", (280.0, 400.0), decades=2)
-    with pytest.raises(DataError, match=r"do not overlap: the modulus reaches .* at 126.9 degC and begins at .*6.85 d"):
+    with pytest.raises(
+        DataError, match=r"do not overlap: the storage modulus reaches .* at 126.9 degC and begins at .*6.85 d"
+    ):
         solid_of(material(dma_table={"file": file, "reference": 300.0}))
+
+
+def test_a_gap_of_one_modulus_is_closed_by_the_other(tmp_path):
+    omega, lines = np.geomspace(0.3, 3, 15), ["f [rad/s],G' [Pa],G'' [Pa],T [K]"]
+    for temperature, shift in ((280.0, 10.0), (300.0, 0.1)):
+        modulus = 1e6 * (1 + 100j * omega * shift / (1 + 1j * omega * shift))
+        lines += [f"{w},{g.real},{g.imag},{temperature}" for w, g in zip(omega, modulus, strict=True)]
+    (tmp_path / "dma.csv").write_text("\n".join(lines))
+    table = ModulusTable.model_validate({"file": str(tmp_path / "dma.csv"), "reference": 300.0})
+    assert "superposed at" in one_curve(table, None).superposed
 
 
 @pytest.mark.parametrize(
@@ -211,6 +241,16 @@ def test_shift_factors_that_are_none_and_temperatures_beyond_them_are_refused(tm
     kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
     with pytest.raises((DataError, ValueError), match=message):
         solid_of(material(kelvin=kelvin, temperature=320.0, shift_factors=str(tmp_path / "shifts.csv")))
+
+
+def test_the_table_of_a_master_curve_is_a_table_of_shift_factors(tmp_path):
+    """The columns that `master-curve -o` writes beside log10 a_T are not mistaken for it."""
+    (tmp_path / "x.csv").write_text(
+        "T [degC],shift_factor,shift_factor_low,log10 a_T\n0,-1,-1,1\n20,0,0,0\n40,1,1,-1\n"
+    )
+    factors = ShiftFactors.model_validate(str(tmp_path / "x.csv"))
+    assert factors.reference == pytest.approx(293.15)
+    assert factors.factor(303.15) == pytest.approx(10**-0.5)
 
 
 def test_a_note_compares_the_frequencies_of_a_study_with_the_data(tmp_path):

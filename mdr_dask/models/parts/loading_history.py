@@ -13,7 +13,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.data_file import NamedFile, check_in_campaign
-from mdr_dask.tables import read_table
+from mdr_dask.tables import Read, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.transients.elements.loading_history import Piece
@@ -106,6 +106,11 @@ class TableFile(_History):
         check_in_campaign(info, lambda: _table_rows(self.file, 1.0))
         return self
 
+    def notes(self) -> tuple[str, ...]:
+        """Return a note on the columns of the table that are not used."""
+        remark = _table(self.file).remark
+        return (f"table {self.file.name}: {remark}",) if remark else ()
+
 
 Protocol = Annotated[Jump | Steps | Ramp | Oscillation | TableFile, Field(discriminator="shape")]
 
@@ -148,14 +153,18 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     return before, [*found, Piece(end[0], np.inf, (end[1], end[1]), (end[2], end[2]))]
 
 
-@lru_cache(maxsize=16)
-def _table_rows(file: NamedFile, force: float) -> list[tuple[float, float, float]]:
+def _table(file: NamedFile) -> Read:
     columns = (
         Column("time", "s", least=0),
         Column("velocity", "m/s"),
         Column("force", "N", ("normal force",), needed=False, above=0),
     )
-    table = read_table(file.read_text(), file.name, columns)
+    return read_table(file.read_text(), file.name, columns)
+
+
+@lru_cache(maxsize=16)
+def _table_rows(file: NamedFile, force: float) -> list[tuple[float, float, float]]:
+    table = _table(file)
     time, velocity = table["time"], table["velocity"]
     load = table.get("force", np.full(time.size, force))
     if time[0] != 0 or np.any(np.diff(time) < 0):

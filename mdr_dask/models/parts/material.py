@@ -117,7 +117,11 @@ class Material(Parameters):
             raise ValueError(f"expected one of {', '.join(LAWS)}, got {' and '.join(laws)}")
         superposing = self.dma_table is not None and self.dma_table.table_temperature is None
         if (self.temperature is not None and not laws) or (self.temperature is None and laws and not superposing):
-            raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}: give both or neither")
+            hint = " (`mdr-dask master-curve` finds wlf from a table; or vary reference of dma_table instead)"
+            raise ValueError(
+                f"expected a temperature together with one of {', '.join(LAWS)}: give both or neither"
+                f"{'' if self.dma_table is None or laws else hint}"
+            )
         check_in_campaign(info, lambda: solid_of(self))
         return self
 

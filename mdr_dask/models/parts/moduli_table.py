@@ -23,6 +23,8 @@ from mdr_dask.units import shown
 #: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
+#: Columns that determine storage and loss modulus.
+WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
 SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this value count as equal
 #: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
 APART = 0.02
@@ -198,7 +200,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
             f"{chosen.file.name}: expected a reference between {shown(levels[0], 'K')} and {shown(levels[-1], 'K')}, "
             f"got {shown(chosen.reference, 'K')}"
         )
-    _require_overlap(storage, member, levels)
+    _require_overlap(np.array([storage, loss]), member, levels)
     x, y = np.log10(omega), np.log10([storage, loss])
     parts = [member == number for number in range(levels.size)]
     free = superpose(levels, [(x[part], y[:, part]) for part in parts], chosen.vertical)
@@ -229,21 +231,37 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
     )
 
 
-def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Raise DataError if there is a gap between the moduli of two curves. No horizontal shift can close such a gap."""
+def _require_overlap(moduli: FloatArray, member: IntArray, levels: FloatArray) -> None:
+    """Raise DataError if some curves overlap with the others in neither of the two `moduli`, shape (2, rows).
+
+    No horizontal shift can close such a gap.
+    """
     low, high = (
-        np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
+        np.array([find(moduli[:, member == number], axis=1) for number in range(levels.size)]).T
+        for find in (np.min, np.max)
     )
-    order = np.argsort(low)
-    reach = np.maximum.accumulate(high[order])
-    for place in np.flatnonzero(np.log10(low[order][1:] / reach[:-1]) > APART)[:1]:
-        below = order[: place + 1][np.argmax(high[order[: place + 1]])]
-        above = order[place + 1]
-        raise DataError(
-            f"the curves do not overlap: the modulus reaches {shown(high[below], 'Pa')} at {shown(levels[below], 'K')} "
-            f"and begins at {shown(low[above], 'Pa')} at {shown(levels[above], 'K')}: measure in between, or give the "
-            "shift factors (wlf, arrhenius or shift_factors, and no reference)"
-        )
+    gap = np.log10(low[:, :, None] / high[:, None])  # of each modulus, for all pairs of curves
+    apart = np.all(np.maximum(gap, gap.transpose(0, 2, 1)) > APART, axis=0)
+    order = np.argsort(low[0])
+    for place in range(1, order.size):
+        softer, stiffer = order[:place], order[place:]
+        if apart[np.ix_(softer, stiffer)].all():
+            below, above = softer[np.argmax(high[0, softer])], stiffer[0]
+            raise DataError(
+                f"the curves do not overlap: the storage modulus reaches {shown(high[0, below], 'Pa')} at "
+                f"{shown(levels[below], 'K')} and begins at {shown(low[0, above], 'Pa')} at {shown(levels[above], 'K')}"
+                ", and there is a gap in the loss modulus too: measure in between, or give the shift factors (wlf, "
+                "arrhenius or shift_factors, and no reference)"
+            )
+
+
+def moduli_of(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return storage and loss modulus, computed from the columns of one of the `WAYS`; the phase angle is in rad."""
+    if "complex modulus" in columns:
+        size, angle = columns["complex modulus"], columns["phase angle"]
+        return size * np.cos(angle), size * np.sin(angle)
+    storage = columns["storage modulus"]
+    return storage, columns["loss modulus"] if "loss modulus" in columns else storage * columns["tan delta"]
 
 
 def _table(chosen: ModulusTable) -> Read:
@@ -263,7 +281,7 @@ def _table(chosen: ModulusTable) -> Read:
         Column("phase angle", "rad", needed=False, above=0),
     )
     try:
-        table = read_table(content, name, columns)
+        table = read_table(content, name, columns, allow_missing=True, ways=WAYS)
     except TableError as problem:
         headings = read_sheet(content, name).names
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
@@ -273,17 +291,13 @@ def _table(chosen: ModulusTable) -> Read:
                 "modulus (`mdr-dask master-curve` merges relaxation curves)"
             ) from problem
         raise
-    if {"complex modulus", "phase angle"} <= table.keys() and "storage modulus" not in table:
-        angle = table["phase angle"]
-        table["storage modulus"] = table["complex modulus"] * np.cos(angle)
-        table["loss modulus"] = table["complex modulus"] * np.sin(angle)
+    table.leave_out_incomplete()
+    if table["frequency"].size < 2:
+        raise DataError(f"{name}: expected at least two rows with all numbers, got {table['frequency'].size}")
+    if "complex modulus" in table:
         table.headings = {**table.headings, "storage modulus": table.headings["complex modulus"]}
-    if "storage modulus" not in table:
-        raise DataError(f"{name}: expected a column storage modulus, or columns complex modulus and phase angle")
-    if "loss modulus" not in table and "tan delta" in table:
-        table["loss modulus"] = table["storage modulus"] * table["tan delta"]
-    if "loss modulus" not in table:
-        raise DataError(f"{name}: expected a column 'loss modulus' or 'tan delta'")
+    storage, loss = moduli_of(table)
+    table.update({"storage modulus": storage, "loss modulus": loss})
     return table
 
 

@@ -93,9 +93,7 @@ def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
         Column("a_T", "1", ("aT", "a(T)", "shift factor"), needed=False, above=0),
         Column("log10 a_T", "1", ("log aT", "log a_T", "log10 aT", "log10(aT)", "log(aT)"), needed=False),
     )
-    table = read_table(factors.file.read_text(), name, columns)
-    if ("a_T" in table) == ("log10 a_T" in table):
-        raise DataError(f"{name}: expected either a column a_T or a column log10 a_T")
+    table = read_table(factors.file.read_text(), name, columns, ways=(("log10 a_T",), ("a_T",)))
     decades = np.log10(table["a_T"]) if "a_T" in table else table["log10 a_T"]
     order = np.argsort(table["temperature"])
     temperature, decades = table["temperature"][order], decades[order]
