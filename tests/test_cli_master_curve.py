@@ -56,6 +56,7 @@ def test_factors_and_merged_curve_are_written_and_kept_results_are_recognised(tm
     other = kept.rename(tmp_path / "kept.dat")
     assert main(["master-curve", str(other), "--reference", "60", "--show", "curve", "-o", str(curve)]) == 0
     assert factors.read_text().splitlines()[0].startswith("T [degC],shift_factor,shift_factor_error")
+    assert factors.read_text().splitlines()[0].endswith(",log10 a_T")
     assert curve.read_text().splitlines()[0] == "curve,t [s],E_relax [MPa],curve_error"
     printed = capsys.readouterr()
     assert "the law wlf deviates from the factors by" in printed.err

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli.options import csv_option, figure_options, json_option, select_option, series_option, tell
-from mdr_dask.cli.printing import print_json, print_rows, table
+from mdr_dask.cli.printing import print_json, print_rows, table, titled
 from mdr_dask.cli.results import Reading
 from mdr_dask.cli.writing import require_suffix, writing
 from mdr_dask.errors import DataError
@@ -178,6 +178,9 @@ def _kept(source: str) -> xr.Dataset | None:
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
     """Print one part of the result. If the curves differ in two quantities, print a table of factors for each."""
+    from mdr_dask.fits.collapse import sign_of
+    from mdr_dask.fits.curve_tables import is_temperature
+
     shown = []
     if part != "factors":
         dims = (part.removesuffix("s"),)
@@ -188,6 +191,9 @@ def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
         for names in (kept, ("second_factor",)):
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
+        by = str(curve.attrs["group"])
+        if form == "csv" and is_temperature(by, curve[by].attrs.get("units", "")):  # as `shift_factors` reads it
+            shown[0] = shown[0].assign({"log10 a_T": sign_of(str(curve.attrs["abscissa"])) * curve["shift_factor"]})
     attrs = ("abscissa", "ordinate", "companion", "group")
     own = {f"{part.removesuffix('s')}_{key}": str(curve.attrs[key]) for key in attrs if curve.attrs.get(key)}
     for dataset in shown:
@@ -213,9 +219,10 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     click.echo(f"shifted: {moved}; {curve.attrs['vertical']}", err=True)
     low, high = (float(curve["curve_abscissa"].attrs[f"measured_{end}"]) for end in ("low", "high"))
     ends = curve["curve_abscissa"].to_numpy()
+    over = titled(str(curve.attrs["abscissa"]), curve["curve_abscissa"].attrs["units"])
     click.echo(
-        f"{curve.attrs['abscissa']} of the merged curve: {ends.min():.4g} .. {ends.max():.4g}, "
-        f"of which {low:.4g} .. {high:.4g} was measured at {by} = {curve.attrs['reference']:.6g}",
+        f"{over} of the merged curve: {ends.min():.4g} .. {ends.max():.4g}, of which {low:.4g} .. {high:.4g} was "
+        f"measured at {titled(by, curve[by].attrs['units'])} = {curve.attrs['reference']:.6g}",
         err=True,
     )
     constants = {str(n): float(v) for n, v in curve.data_vars.items() if v.ndim == 0 and f"{n}_low" in curve}
@@ -229,7 +236,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
                 err=True,
             )
     if "law_holds" in curve:
-        click.echo(f"law_holds = {curve['law_holds'].item()}", err=True)
+        click.echo("law_holds = " + curve["law_holds"].item().replace(": ", "\n", 1), err=True)
     for sentence in ("not_used", "left_out", "undetermined"):
         if curve.attrs.get(sentence):
             click.echo(curve.attrs[sentence], err=True)

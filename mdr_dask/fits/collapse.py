@@ -50,7 +50,7 @@ def laws_of(
         return [], {"law of the shifts": f"not tested: {problem}"}
     verdicts = {}
     for law in fits:
-        where = f"{result.groups[np.argmax(np.abs(law.departures))]:.4g}"
+        where = f"{result.groups[np.argmax(np.abs(law.departures))]:.4g} {'' if unit == '1' else unit}".rstrip()
         verdicts[law.name] = law_holds(LOG * law.departures[free], law.chance, len(law.constants), where, scatter)
     return fits, verdicts
 
@@ -105,7 +105,7 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
         word = "not tested"
     else:
         word = "yes" if words[0] == "yes" and "yes" in described else "approximately"
-    sentence = f"{word}: " + "; ".join(f"{name}: {reason}" for name, reason in answers.items())
+    sentence = f"{word}: " + ";\n".join(f"{name}: {reason}" for name, reason in answers.items())
     return curve.assign(law_holds=xr.Variable((), sentence, LAW_HOLDS))
 
 
@@ -141,7 +141,9 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
         excess = max(squares - within, 0.0) / more
         chance = float(fdtrc(more, freedom, excess * freedom / max(within, 1e-300)))
     worst = int(np.argmax(np.abs(off)))
-    return law_holds(LOG * off, chance, 0, f"{curve.attrs['abscissa']} = {10 ** x[worst]:.3g} of the merged curve")
+    unit = curve["curve_abscissa"].attrs["units"]
+    place = f"{curve.attrs['abscissa']} = {10 ** x[worst]:.3g} {'' if unit == '1' else unit}".rstrip()
+    return law_holds(LOG * off, chance, 0, f"{place} of the merged curve")
 
 
 def _scatter(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> tuple[float, float, int]:

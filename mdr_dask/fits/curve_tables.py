@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import JOINED, is_called, nearest
+from mdr_dask.models.parts.moduli_table import WAYS, moduli_of
 from mdr_dask.tables import AGREE, decoded, numbers, read_sheet
-from mdr_dask.units import converts, is_unit
+from mdr_dask.units import conversion, converts, is_unit
 
 if TYPE_CHECKING:
     from mdr_dask.physics.superposition.master_curve import Vertical
@@ -38,6 +39,30 @@ def read_table(path: str | Path) -> pd.DataFrame:
     table = pd.DataFrame(values[:, kept], columns=[names[k] for k in kept])
     units = {names[k]: sheet.units[k] for k in kept}
     table.attrs["units"] = units if any(units.values()) else {}
+    return _with_moduli(table)
+
+
+def _with_moduli(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with columns of storage and loss modulus, if it has other columns that determine them."""
+    names = {name: column_of(table, name) for way in WAYS for name in way}
+    way = next((way for way in WAYS if None not in [names[name] for name in way]), WAYS[0])
+    if way == WAYS[0]:
+        return table
+    columns = {name: table[names[name]].to_numpy(dtype=np.float64) for name in way}
+    units = table.attrs["units"]
+    if "phase angle" in columns:
+        unit = units.get(names["phase angle"], "")
+        if not converts(unit, "rad"):
+            raise DataError(
+                f"column {names['phase angle']!r}: expected an angle with its unit, such as deg, got {unit!r}"
+            )
+        columns["phase angle"] = columns["phase angle"] * conversion(unit, "rad")[0]
+    kept, modulus = table.attrs, units.get(names[way[0]], "")
+    for name, values in zip(WAYS[0], moduli_of(columns), strict=True):
+        if name not in columns:
+            table = table.assign(**{name.replace(" ", "_"): values})
+            units[name.replace(" ", "_")] = modulus
+    table.attrs = {**kept, "sources": [names[name] for name in way]}
     return table
 
 
@@ -161,14 +186,24 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
     return "compliance" if all(is_one(each, "compliance", unit="1/Pa") for each in ordinates) else "none"
 
 
-def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return the column of a further velocity or temperature in which the curves differ; None if there is none."""
+def second_group(frame: pd.DataFrame, used: Sequence[str]) -> str | None:
+    """Return the column of a further velocity or temperature in which the curves differ; None if there is none.
+
+    Forces and velocities are conditions of friction, but readings of the instrument in a table of moduli against time
+    or frequency.
+    """
     found = None
-    for name in ("normal_force", "velocity", "temperature"):
+    of_moduli = not any(_is(name, "friction_coefficient") for name in used) and any(
+        _is(name, over) for name in used for over in ("frequency", "time")
+    )
+    for name in ("temperature",) if of_moduli else ("normal_force", "velocity", "temperature"):
         column = column_of(frame, name)
         if column is not None and column not in used and frame[column].nunique() > 1:
             if found is not None or name == "normal_force":
-                raise DataError(f"the table varies in {column!r} too: keep one of its values, or group by it")
+                raise DataError(
+                    f"the table varies in {column!r} too: keep one of its values, group by it, or delete the column if "
+                    "it only scatters about one value"
+                )
             found = column
     return found
 

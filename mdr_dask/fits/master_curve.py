@@ -48,10 +48,11 @@ def master_curve(
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
     units = frame.attrs.get("units", {})
-    second = second_group(frame, {over, *ordinates, by})
+    second = second_group(frame, (over, *ordinates, by))
     if isinstance(table, xr.Dataset):
         _require_no_axis_beside(table[ordinates[0]], {over, by, second, "realisation"})
-    unused = [str(name) for name in frame.columns if name not in (over, *ordinates, by, second)]
+    used = (over, *ordinates, by, second, *frame.attrs.get("sources", ()))
+    unused = [str(name) for name in frame.columns if name not in used]
     not_used = f"not used: {', '.join(unused)}" if unused and isinstance(table, pd.DataFrame) else ""
     frame, left_out = finite_rows(frame, [over, *ordinates, by] + ([second] if second else []))
     kind = kind_of(over, ordinates, by, units) if vertical is None else vertical
@@ -67,16 +68,25 @@ def master_curve(
     zero = float(groups[groups.size // 2]) if reference is None else _inside(groups, reference)
     kelvin = kelvins(groups, units.get(by, "")) if kind in ("modulus", "compliance") else None
     free = superposition.superpose(groups, curves, kind, kelvin=kelvin)
+    largest = "" if kelvin is None else _largest_offset(free, superposition.known_rise(np.sort(kelvin), kind))
     attrs = {
         "left_out": left_out,
         "not_used": not_used,
-        "vertical": _sentence(kind),
+        "vertical": _sentence(kind, f"{largest} {units.get(by, '')}".rstrip()),
         "undetermined": _undetermined(free),
     }
     return _with_laws(free, zero, over, ordinates, by, units, attrs)
 
 
-def _sentence(kind: Vertical) -> str:
+def _largest_offset(found: Superposition, rise: FloatArray) -> str:
+    """Return a text with the group whose ordinates deviate most from their median, without the known `rise`."""
+    offset = rise - found.vertical
+    offset -= np.median(offset)
+    worst = int(np.argmax(np.abs(offset)))
+    return f"; the largest one found is {100 * (10 ** offset[worst] - 1):+.2g} % at {found.groups[worst]:.4g}"
+
+
+def _sentence(kind: Vertical, largest: str = "") -> str:
     if kind == "none":
         return "horizontal factors only"
     if kind == "free":
@@ -85,7 +95,7 @@ def _sentence(kind: Vertical) -> str:
     offset = 100 * np.log(10) * OFFSET[0]
     return (
         f"a {kind}: {b_t} with an expansion of {EXPANSION:g} 1/K is taken out, and each temperature has an unknown "
-        f"offset of some {offset:.2g} % (--vertical none turns both off)"
+        f"offset of some {offset:.2g} % (--vertical none turns both off){largest}"
     )
 
 

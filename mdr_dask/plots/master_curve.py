@@ -32,7 +32,8 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     panels = [*_curves(curve), *(_factors(curve, *shift) for shift in shifts)]
     fixed = ", ".join(dict.fromkeys(f"{_words(by)} = {_text(value, curve[by])}" for by, _, value in shifts))
     figure = Figure(panels, "master curve", f"reference: {fixed}", "bars and band: 68 %", ratio=0.85)
-    figure.judge(curve["law_holds"].item())
+    word, _, answers = curve["law_holds"].item().partition(": ")
+    figure.judge(f"{word}: " + "; ".join(": ".join(line.split(": ")[:2]) for line in answers.split(";\n")))
     return figure
 
 

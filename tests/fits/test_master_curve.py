@@ -6,7 +6,15 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fits.curve_tables import clusters, column_of, curves_of, finite_rows, read_table
+from mdr_dask.fits.curve_tables import (
+    clusters,
+    column_of,
+    columns_to_use,
+    curves_of,
+    finite_rows,
+    read_table,
+    second_group,
+)
 from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, rereferenced
 
 DATA = Path(__file__).parents[1] / "data" / "dma"
@@ -100,6 +108,23 @@ def moduli_of_a_rubber(readings):
             modulus = 1e6 * (1 + sum(w * t / (1 + w * t) * t**-0.3 for t in np.geomspace(1e-4, 1e2, 13)))
             rows.append((frequency, modulus.real, modulus.imag, temperature + readings[k % len(readings)]))
     return rows
+
+
+def test_moduli_may_be_given_by_other_columns(tmp_path):
+    moduli = np.array(moduli_of_a_rubber([0.0]))
+    f, storage, loss, temperature = moduli.T
+    polar = [f, np.hypot(storage, loss), np.degrees(np.arctan2(loss, storage)), temperature]
+    others = {
+        ("f [Hz]", "|G*| [MPa]", "delta [deg]", "T [K]", "Normal force [N]"): [*polar, np.arange(f.size)],
+        ("f [Hz]", "G' [MPa]", "tan d", "T [K]"): [f, storage, loss / storage, temperature],
+    }
+    for heads, columns in others.items():
+        pd.DataFrame(dict(zip(heads, columns, strict=True))).to_csv(tmp_path / "t.csv", index=False)
+        table = read_table(tmp_path / "t.csv")
+        over, found, by = columns_to_use(table, None, None, None)
+        np.testing.assert_allclose(table[list(found)].to_numpy(), moduli[:, 1:3])
+        assert table.attrs["units"][found[1]] == "MPa"
+        assert second_group(table, (over, *found, by)) is None
 
 
 def test_rounded_readings_of_one_sweep_are_one_temperature():
