@@ -37,14 +37,14 @@ from mdr_dask.physics.surfaces.cubic_line import without_kinks
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import solve_jumps
-from mdr_dask.physics.transients.elements.foundation import foundation
-from mdr_dask.physics.transients.elements.loading_history import Trace, trace
+from mdr_dask.physics.transients.elements.foundation import Foundation, foundation
+from mdr_dask.physics.transients.elements.loading_history import Piece, Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# The operations of a jump are OPERATIONS_MARCHED times nodes times steps per decade. The operations of a history are
-# OPERATIONS_FOLLOWED times nodes squared.
-OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
+OPERATIONS_MARCHED = 20  # operations of a jump, divided by the number of nodes and by the number of steps per decade
+# operations for one element in one time step of a history, without the modes of the solid and for each mode
+OPERATIONS_FOLLOWED, OPERATIONS_A_MODE = 300, 25
 
 #: Names of the outputs for which errors are estimated.
 WITH_ERROR = (
@@ -253,21 +253,35 @@ class _Followed(_Group):
         case = self.block.case(int(self.members[0]))
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
-    def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a coarser grid. With every = 4, for example, the grid consists of every fourth node."""
+    @cached_property
+    def _history(self) -> tuple[Foundation, tuple[float, float], list[Piece]]:
+        """The solid, velocity and load before the history, and the pieces of the history, in dimensionless form."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
         static = solid.static_modulus
         (before, load), history = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
         velocity, force = length / unit, 4 * static * length * height
-        history = [piece.scaled(unit, velocity, force) for piece in history]
+        elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
+        return elements, (before / velocity, load / force), [piece.scaled(unit, velocity, force) for piece in history]
+
+    def _trace(self, waves: Waves, every: int) -> Trace:
+        """Compute the case on a coarser grid. With every = 4, for example, the grid consists of every fourth node."""
+        elements, before, history = self._history
         nodes = waves.points * self.oversampling
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
         line = without_kinks(RoughLine(waves, self.setting.body).through(heights, slopes))
-        elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
-        times = np.array(case.relaxation_times)
-        return trace(line, elements, (before / velocity, load / force), history, times, self.steps / every)
+        times = np.array(self.block.parameters.relaxation_times)
+        return trace(line, elements, before, history, times, self.steps / every)
+
+    @property
+    def operations(self) -> float:
+        """Approximate number of operations on the finest grid."""
+        elements, _, history = self._history
+        nodes, last = self.setting.roughness.points * self.oversampling, self.block.parameters.relaxation_times[-1]
+        begun = [piece for piece in history if piece.start < last]
+        steps = sum((min(piece.end, last) - piece.start) / piece.longest_step(nodes, self.steps) for piece in begun)
+        return nodes * steps * (OPERATIONS_FOLLOWED + OPERATIONS_A_MODE * elements.rates.size)
 
 
 def _check_rough(roughness: Roughness) -> None:
@@ -288,13 +302,12 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def operations(block: Block[VelocityJump]) -> float:
-    """Return the approximate number of operations of a block, estimated from the number of nodes in its cases."""
+    """Return the approximate number of operations of a block, estimated from the nodes and time steps of its cases."""
     total = 1e6
     for group in _groups(block, sliding_problems(block)):
-        nodes = group.setting.roughness.points * group.oversampling
         if isinstance(group, _Marched):
-            per_case = nodes * group.steps * OPERATIONS_MARCHED
+            per_case = group.setting.roughness.points * group.oversampling * group.steps * OPERATIONS_MARCHED
             total += group.different[0].size * per_case * len(block.realisations)
         else:
-            total += nodes**2 * OPERATIONS_FOLLOWED * len(block.realisations)
+            total += group.operations * len(block.realisations)
     return total

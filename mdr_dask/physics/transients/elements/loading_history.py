@@ -230,6 +230,12 @@ class Piece:
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
         return np.inf if same else self.end - self.start
 
+    def longest_step(self, nodes: int, per_decade: float) -> float:
+        """Return the longest time step, which depends on the travel of the line and on the changes of its motion."""
+        fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
+        most = CELLS / (nodes * fastest) if fastest else np.inf
+        return min(most, PART * self.changes_in) / per_decade
+
     def instants(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
         """Return the times of all steps from the start of the piece to `end`, or None if there would be too many steps.
 
@@ -238,9 +244,7 @@ class Piece:
         span = end - self.start
         if span <= 0:
             return np.array([self.start])
-        fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
-        most = CELLS / (nodes * fastest) if fastest else np.inf
-        most = min(min(most, PART * self.changes_in) / per_decade, span)
+        most = min(self.longest_step(nodes, per_decade), span)
         if span / most > MOST_STEPS:
             return None
         first, ratio = FIRST / per_decade * min(most, 1.0), 10 ** (1 / per_decade)
