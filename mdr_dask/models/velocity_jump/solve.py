@@ -126,6 +126,11 @@ class _Group:
         """F_N / (4 G_inf L h) of each case; for a history, the largest value during the history."""
         return self.problems.loads[self.members]
 
+    @property
+    def operations(self) -> float:
+        """Approximate number of operations of one realisation."""
+        raise NotImplementedError
+
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the cases on one realisation of the roughness; also return the number of solved cases."""
         raise NotImplementedError
@@ -208,6 +213,12 @@ class _Marched(_Group):
         }
         values, errors = ({name: pair[k][which] for name, pair in outputs.items()} for k in (0, 1))
         return _Found(values, errors, jumps.contact[which], jumps.outcome[which]), loads.size
+
+    @property
+    def operations(self) -> float:
+        """Operations of all different cases."""
+        nodes = self.setting.roughness.points * self.oversampling
+        return self.different[0].size * nodes * self.steps * OPERATIONS_MARCHED
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -303,11 +314,5 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 def operations(block: Block[VelocityJump]) -> float:
     """Return the approximate number of operations of a block, estimated from the nodes and time steps of its cases."""
-    total = 1e6
-    for group in _groups(block, sliding_problems(block)):
-        if isinstance(group, _Marched):
-            per_case = group.setting.roughness.points * group.oversampling * group.steps * OPERATIONS_MARCHED
-            total += group.different[0].size * per_case * len(block.realisations)
-        else:
-            total += group.operations * len(block.realisations)
-    return total
+    groups = _groups(block, sliding_problems(block))
+    return 1e6 + len(block.realisations) * sum(group.operations for group in groups)

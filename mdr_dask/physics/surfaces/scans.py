@@ -124,5 +124,6 @@ def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
 
     start = np.log(np.append(density, density[-1] * (q[-1] / edge) ** 3) / (np.pi * knots))
     fit = optimize.least_squares(residual, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12)
-    covariance = np.linalg.inv(fit.jac.T @ fit.jac)
+    slopes = jacobian(fit.x)
+    covariance = np.linalg.inv(slopes.T @ slopes)
     return Spectrum(knots, np.exp(fit.x)), np.sqrt(np.diag(covariance))
