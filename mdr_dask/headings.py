@@ -39,7 +39,8 @@ C1D, C, line spectrum, psd 1d, psd, c(q)
 x, X, position, pos, distance, length, weg
 height, z, Z, h, höhe
 radius, r
-wear volume, worn volume, verschleißvolumen
+wear volume, worn volume, V, verschleißvolumen
+cycles, number of cycles, N, zyklen, zyklenzahl
 """.splitlines()
 )  # fmt: skip
 #: Words before or after the name of a quantity that do not change the meaning of the name.

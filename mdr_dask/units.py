@@ -118,9 +118,11 @@ _MEANINGS = {
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
-#: A number before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``.
+#: A number before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``, and a factor of pure numbers, as in
+#: ``10^3`` or ``x 1000``. A number alone, as in ``mu (10)``, is no factor: it may be a condition.
+_POWER = r"10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?e[+-]?\d+"
 _FACTOR = re.compile(
-    r"[x×*]?\s*(10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?(?:e[+-]?\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE
+    rf"([x×*]\s*\d+|{_POWER})\Z|[x×*]?\s*({_POWER}|\d+(?:\.\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE
 )
 _DEGREES = re.compile(r"(?:(?i:deg(?:rees?)?\.?|°)\s*([CFcf])|([CF]))")
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
@@ -315,7 +317,7 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     """Return `factor` and `zero` of a unit: ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`."""
     from pint.errors import DimensionalityError, UndefinedUnitError
 
-    units = registry()
+    units, wanted = registry(), "a pure number" if unit == "1" else expected(unit)
     try:
         before, spelling = _factor_and_unit(given)
         source, target = (units.parse_units(text) for text in (spelling, _factor_and_unit(unit)[1]))
@@ -325,13 +327,15 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
         raise ValueError(f"unknown unit {word!r}{_nearest(word, unit if word == given.strip() else '')}") from None
     except DimensionalityError:
         hint = " (1 kg weighs 9.81 N)" if source == units.kilogram and target == units.newton else ""
+        if wanted == "a pure number" and source.dimensionality == (1 / units.pascal).dimensionality:
+            hint = " (a wear rate in mm^3/(N m) times the hardness is a pure number)"
         for angle in (units.turn, 1 / units.turn) if "[time]" in source.dimensionality else ():
             one = units.Quantity(1.0, source) * angle
             if one.is_compatible_with(target):
                 hint = f" (1 {spelling} is {one.to(target).magnitude:.4g} {unit})"
-        raise ValueError(f"expected {expected(unit)}{hint}") from None
+        raise ValueError(f"expected {wanted}{hint}") from None
     except Exception:  # pint's parser raises many types of exceptions: TypeError, AssertionError, ...
-        raise ValueError(f"expected {expected(unit)}") from None
+        raise ValueError(f"expected {wanted}") from None
     factor = one - zero
     return (before * (1.0 if math.isclose(factor, 1.0) else factor), zero) if zero else (before * one, 0.0)
 
@@ -370,7 +374,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
     text = re.sub(r"[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+", lambda power: "^" + unicodedata.normalize("NFKC", power[0]), text)
     text = unicodedata.normalize("NFKC", text.replace("º", "°").replace("%", " percent ")).strip()
     found = _FACTOR.match(text)
-    number = re.sub(r"^10\s*\^\s*", "1e", found[1]) if found else "1"
+    number = re.sub(r"^10\s*\^\s*", "1e", found[found.lastindex or 1].lstrip("x×X* ")) if found else "1"
     unit = text[found.end() :] if found else text
     unit = re.sub(r"^(HV|HBW?)\s?\d+([.,/]\d+)*$", r"\1", unit)  # the number after a hardness is the test load: HV10
     unit = unit.replace("−", "-").replace("·", " ").replace("microns", "micron")

@@ -45,6 +45,20 @@ def test_units_may_have_a_factor(written):
     np.testing.assert_array_equal(joined["wear volume"], below["wear volume"])
 
 
+@pytest.mark.parametrize(
+    "heading", ["cycles (10^3)", "Cycles (x1000)", "cycles, 10³", "Number of cycles [1e3]", "Cycles N / 10^3"]
+)
+def test_pure_numbers_may_have_a_factor(heading):
+    read = read_table(f"{heading};mu\n1;0,5\n2;0,7\n", "v.csv", [Column("cycles", "1")])
+    assert read["cycles"].tolist() == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize("heading", ["cycles (1000)", "cycles [N]"])
+def test_a_number_alone_is_no_factor(heading):
+    with pytest.raises(DataError, match="column cycles: expected a pure number"):
+        read_table(f"{heading};mu\n1;0,5\n2;0,7\n", "v.csv", [Column("cycles", "1")])
+
+
 @pytest.mark.parametrize("missing", ["n.a.", "n/a", "NaN", "-", "****", "#N/A"])
 def test_missing_numbers_are_found_in_any_spelling(missing):
     text = f"sample;f [Hz];E' [MPa];remark\nA;1;2;\nB;{missing};{missing};filter\nC;2;3\n"

@@ -73,7 +73,10 @@ WRONG = {
     "no unit": ("f [Hz],E'\n1,2\n", "1:8: $expected its unit, such as 'storage modulus [MPa]' in the first line"),
     "capitals of a unit": ("f [Hz],E' [mpa]\n1,2\n", "1:8: $unknown unit 'mpa' (did you mean 'MPa'?)"),
     "unit of another kind": ("f [Hz],E' [mm]\n1,2\n", "1:8: $expected a pressure (such as '10 MPa')"),
-    "dimension on a number": ("f [Hz],E' [Pa],tan delta [MPa]\n1,2,3\n", "1:16: column tan delta: expected a number"),
+    "dimension on a number": (
+        "f [Hz],E' [Pa],tan delta [MPa]\n1,2,3\n",
+        "1:16: column tan delta: expected a pure number",
+    ),
     "unknown column": (
         "f [Hz],E' [Pa],tan delda\n1,2,3\n",
         "1:16: unknown column 'tan delda' (did you mean 'tan delta'?)",

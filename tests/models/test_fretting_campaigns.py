@@ -149,9 +149,10 @@ def test_bad_numbers_are_refused_with_their_place(write, capsys, parameters, pla
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ("0,0\n1e-4,2e-6\n2e-4,1e-6\n1e-3,1e-3\n", "the profile must rise with the radius, got 1e-06 after 2e-06"),
+        ("0,0\n1e-4,2e-6\n2e-4,1e-6\n1e-3,1e-3\n", "must rise with the radius, got the height 1e-06 m after 2e-06 m"),
         ("1e-5,0\n1e-4,1e-6\n2e-4,2e-6\n1e-3,1e-3\n", "must start at 0 and increase"),
-        ("0,0\n1e-4,high\n", "profile.csv:3:6: column height: expected a number, got 'high'"),
+        ("0,0\n1e-4,1x\n", "profile.csv:3:6: column height: expected a number, got '1x'"),
+        ("-1e-4,1e-6\n0,0\n1e-4,1e-6\n2e-4,2e-6\n", "profile.csv:2:1: column radius: expected at least 0"),
     ],
 )
 def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
@@ -162,6 +163,29 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
     assert "wear.yaml:4:34: parameters.indenter.file: profile.csv:" in error
     assert message in error
     assert len(error.splitlines()) == 1
+
+
+def test_rows_of_a_profile_without_a_number_are_left_out_and_counted(write, capsys):
+    rows = ["0,0", "1e-4,1e-6", "2e-4,4e-6", "3e-4,9e-6", "4e-4,16e-6"]
+    path, heading = write(TABLE), "radius [m],height [m]"
+    Path("profile.csv").write_text("\n".join([heading, *rows]))
+    without = filled(path).wear_volume.values
+    shutil.rmtree("wear.zarr")
+    Path("profile.csv").write_text("\n".join([heading, *rows[:2], "1.5e-4,***", *rows[2:]]))
+    assert main(["check", str(path)]) == 0
+    assert "profile.csv: rows without a number are left out: 1" in capsys.readouterr().out
+    np.testing.assert_array_equal(filled(path).wear_volume.values, without)
+
+
+def test_the_limit_needs_neither_hardness_nor_wear_coefficient(write):
+    rate = {"hardness", "wear_coefficient"}
+    kept = "\n".join(line for line in STEEL.splitlines() if line.split(":")[0].strip() not in rate)
+    profiles = "outputs: [wear_volume, worn_profile]\n"
+    rule = "\n  wear_rule: limit\n  hold: [depth, force]\n"
+    without = filled(write(kept + rule, profiles))
+    shutil.rmtree("wear.zarr")
+    np.testing.assert_array_equal(without.worn_profile, filled(write(STEEL + rule, profiles)).worn_profile)
+    assert (without.wear_volume > 0).all()
 
 
 @pytest.mark.parametrize(

@@ -56,18 +56,25 @@ class Table(Parameters):
         from mdr_dask.physics.mdr.revolution import check_table
 
         try:
-            check_table(*profile_columns(file))
+            check_table(*profile_columns(file)[:2])
         except DataError as problem:
             raise ValueError(str(problem)) from None
         except ValueError as problem:
             raise ValueError(f"{file.name}: {problem}") from None
         return file
 
+    def notes(self) -> tuple[str, ...]:
+        """Return a note if rows of the table are left out."""
+        missing = profile_columns(self.file)[2]
+        return (f"{self.file.name}: rows without a number are left out: {missing}",) if missing else ()
 
-def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
-    """Return radii and heights of a measured profile, in metres."""
-    table = read_table(file.read_text(), file.name, (Column("radius", "m"), Column("height", "m", ("f",))))
-    return table["radius"], table["height"]
+
+def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray, int]:
+    """Return radii and heights of a measured profile, in metres, and the number of rows without a number."""
+    columns = Column("radius", "m", least=0.0), Column("height", "m", ("f",))
+    table = read_table(file.read_text(), file.name, columns, allow_missing=True)
+    known = np.isfinite(table["radius"]) & np.isfinite(table["height"])
+    return table["radius"][known], table["height"][known], int(np.count_nonzero(~known))
 
 
 Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]
@@ -94,6 +101,8 @@ class LoadStep(Parameters):
 #: Message if the fast rule is requested under constant force.
 FAST_AT_DEPTH = "wear_rule fast is for constant depth only: write wear_rule: exact for hold: force"
 _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
+#: Parameters of the rate of wear, on which the limiting profile does not depend.
+_OF_RATE = ("hardness", "wear_coefficient")
 
 
 class FrettingWear(Parameters):
@@ -168,7 +177,7 @@ class FrettingWear(Parameters):
         "Pa", "hardness in the wear law V = k F u / hardness", usual="2 GPa, 200 HV", gt=0, default=None
     )
     wear_coefficient: float | None = quantity(
-        "1", "wear coefficient k in the wear law V = k F u / hardness", usual="1e-4", ge=0, default=None
+        "1", "wear coefficient k in the wear law V = k F u / hardness", usual="1e-4", ge=0, le=1, default=None
     )
     xi: float = quantity(
         "1", "factor xi of the fast rule; docs/wear.md states the error of this rule", gt=0, default=0.8
@@ -261,7 +270,8 @@ class FrettingWear(Parameters):
         )
 
     def _check_dimensional(self) -> None:
-        missing = [name for name in self._needed() if getattr(self, name) is None]
+        idle = _OF_RATE if self.wear_rule == "limit" else ()
+        missing = [name for name in self._needed() if getattr(self, name) is None and name not in idle]
         size = _SIZES.get(self.indenter.shape)
         if size is not None and getattr(self.indenter, size) is None:
             missing.insert(0, f"indenter.{size}")
@@ -274,7 +284,7 @@ class FrettingWear(Parameters):
 
     def _needed(self) -> tuple[str, ...]:
         oscillating = _OSCILLATION if self.path is None else ()
-        return ("contact_modulus", *oscillating, "hardness", "wear_coefficient")
+        return ("contact_modulus", *oscillating, *_OF_RATE)
 
 
 def _output(name: str, unit: str, meaning: str, dims: tuple[str, ...] = (), *, default: bool = False) -> Output:

@@ -26,8 +26,9 @@ class Numbers:
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
     stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
-    in sliding wear. `advance` is N divided by the parameter `cycles`, or the dimensionless path divided by the
-    parameter `path`. `length`, `height` and `force` are the units a0, d0 and E* d0 a0.
+    in sliding wear; it is 0 in the limit, which does not depend on it. `advance` is N divided by the parameter
+    `cycles`, or the dimensionless path divided by the parameter `path`. `length`, `height` and `force` are the units
+    a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray
@@ -133,7 +134,9 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
     amount = block.numbers("path" if sliding else "cycles")
     columns = (n, amount, block.numbers("xi"), length, height, force)
     n, amount, xi, length, height, force = (np.broadcast_to(c[:, None], level.shape) for c in columns)
-    return Numbers(n, canonical(level), advance, canonical(amount * advance), xi, length, height, force), messages
+    in_limit = np.asarray(block.column("wear_rule") == "limit")[:, None]
+    cycles = np.where(in_limit, 0.0, canonical(amount * advance))
+    return Numbers(n, canonical(level), advance, cycles, xi, length, height, force), messages
 
 
 def _first_contact(
@@ -175,7 +178,7 @@ def table_profile(indenter: Indenter, depth: float) -> TableProfile:
 def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_table
 
-    return from_table(*profile_columns(file), depth)
+    return from_table(*profile_columns(file)[:2], depth)
 
 
 @lru_cache(maxsize=64)
