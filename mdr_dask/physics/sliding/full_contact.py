@@ -40,9 +40,9 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     # mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    # first check two nodes that exclude full contact in most cases: the node with the largest pressure without the
-    # dashpot, and the node with the largest slope
-    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]
+    # first check the nodes of the extreme pressures without the dashpot, and of the extreme slopes: they exclude full
+    # contact in most cases
+    worst = [pressure.argmin(), pressure.argmax(), slope.argmin(), slope.argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
         pull = np.abs(pressure[worst] + np.multiply.outer(deborah, slope[worst])).max(axis=1)

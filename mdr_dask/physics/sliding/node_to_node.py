@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit, jit_inline
+from mdr_dask.physics.jit import jit, jit_inline, jit_uncounted
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.cases import Cases, first_depths
@@ -60,8 +60,8 @@ class Nodes(NamedTuple):
     rise: float
 
 
-def _ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return corrections of the trapezium rule for the integrals of the height and of the squared slope, shape (2, n).
+def _ends_of(height: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return corrections of the trapezium rule for the integrals of the height and of the squared slope.
 
     The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
     at node j. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which are
@@ -69,9 +69,9 @@ def _ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     """
     n = height.size
     wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
-    parts = fft.rfft([height, (slope / n) ** 2])
-    parts *= np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
-    return np.asarray(fft.irfft(parts, n, overwrite_x=True), dtype=np.float64)
+    factors = np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
+    # one array at a time: scipy takes three times as long for an array with two rows
+    return fft.irfft(fft.rfft(height) * factors, n), fft.irfft(fft.rfft((slope / n) ** 2) * factors, n)
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int) -> Nodes:
@@ -81,40 +81,64 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int) -> Nod
     `stride` > 2 (less than one node per Nyquist point), the slopes are differences of the heights instead.
     """
     n = height.size // stride
-
-    def periodic(values: FloatArray) -> FloatArray:
-        to_end = values[first::stride][:n]
-        period = np.append(to_end, values[first + to_end.size * stride - values.size :: stride][: n - to_end.size])
-        return np.concatenate([period[-BEFORE:], period, period[:AFTER]])
-
-    h = periodic(height) - height[first]
-    if stride <= 2:
-        s = periodic(slope) / n
-    else:
-        s = 0.5 * (np.roll(h, -1) - np.roll(h, 1))
-        s[0], s[-1] = s[n], s[-1 - n]
-    ends = np.array([periodic(one) for one in _ends_of(height, slope)]) if stride == 1 else np.empty((2, 0))
-    cells = n // BLOCK * BLOCK
-    mean, square = np.empty(cells), np.empty(cells + 1)
-    _integrals(h[BEFORE - 1 :], s[BEFORE - 1 :], ends[0, BEFORE - 1 :], ends[1, BEFORE - 1 :], cells, mean, square)
-    blocks = np.empty((n // BLOCK, 5))
-    _write_blocks(h[BEFORE:], s[BEFORE:], mean, square, blocks)
-    return Nodes(h, s, ends, blocks, float(height[first]), 0.0)
+    h, s = np.empty((2, BEFORE + n + AFTER))
+    ends = np.empty((2, h.size if stride == 1 else 0))
+    corrections = _ends_of(height, slope) if stride == 1 else (ends[0], ends[1])
+    line = Nodes(h, s, ends, np.empty((n // BLOCK, 5)), float(height[first]), 0.0)
+    _write_nodes(height, slope, corrections, first, stride, line)
+    return line
 
 
 @jit
-def _write_blocks(h: FloatArray, s: FloatArray, mean: FloatArray, square: FloatArray, blocks: FloatArray) -> None:
-    """Write bounds and sums of every block; the first entry of each array belongs to the first cell."""
+def _write_nodes(
+    height: FloatArray,
+    slope: FloatArray,
+    corrections: tuple[FloatArray, FloatArray],
+    first: int,
+    stride: int,
+    line: Nodes,
+) -> None:
+    """Write the arrays of `line`; the arguments are those of `nodes` and the results of `_ends_of`."""
+    h, s, ends, blocks = line.height, line.slope, line.ends, line.blocks
+    n = h.size - BEFORE - AFTER
+    _write_periodic(height, first, stride, h)
+    h -= line.top
+    if stride <= 2:
+        _write_periodic(slope, first, stride, s)
+        s /= n
+    else:
+        s[1:-1] = 0.5 * (h[2:] - h[:-2])
+        s[0], s[-1] = s[n], s[-1 - n]
+    if ends.size > 0:
+        _write_periodic(corrections[0], first, stride, ends[0])
+        _write_periodic(corrections[1], first, stride, ends[1])
+    mean, square = np.empty(BLOCK), np.empty(BLOCK + 1)
     for j in range(blocks.shape[0]):
+        begin = BEFORE + j * BLOCK
+        _integrals(h[begin - 1 :], s[begin - 1 :], ends[0, begin - 1 :], ends[1, begin - 1 :], BLOCK, mean, square)
         peak, lowest, steepest, heights, squares = -np.inf, np.inf, np.inf, 0.0, 0.0
-        for i in range(j * BLOCK, (j + 1) * BLOCK):
+        for k in range(BLOCK):
+            i = begin + k
             above = max(h[i], h[i + 1]) + STEEPEST_RISE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
             peak, lowest = max(peak, above), min(lowest, min(h[i], h[i + 1]))
             steepest = min(steepest, min(s[i], s[i + 1]))
-            heights += mean[i]
-            squares += square[i]
+            heights += mean[k]
+            squares += square[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
+
+
+@jit
+def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatArray) -> None:
+    """Write every stride-th value of a period from `first` on, and those at `BEFORE` and `AFTER` nodes around it."""
+    n, place = written.size - BEFORE - AFTER, first
+    for i in range(BEFORE, BEFORE + n):
+        written[i] = values[place]
+        place += stride
+        if place >= values.size:
+            place -= values.size
+    written[:BEFORE] = written[n : n + BEFORE]
+    written[BEFORE + n :] = written[BEFORE : BEFORE + AFTER]
 
 
 @jit
@@ -372,7 +396,7 @@ def _contact_in_cell(
     return gap < 0, stop, crest, held, gap
 
 
-@jit
+@jit_uncounted
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     """Move one element of case k along a tile, and add the integrals over the tile to the sums of this case."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
@@ -436,7 +460,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     workspace[STRETCH + k] += stretch
 
 
-@jit
+@jit_uncounted
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
