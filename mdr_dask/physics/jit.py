@@ -38,6 +38,11 @@ def jit_inline(function: Kernel) -> Kernel:
     return cast(Kernel, numba.njit(forceinline=True, **OPTIONS)(function))
 
 
+def jit_inline_fused(function: Kernel) -> Kernel:
+    """Compile a function into each kernel that calls it; a product and the sum with it are rounded only once."""
+    return cast(Kernel, numba.njit(forceinline=True, fastmath={"contract"}, **OPTIONS)(function))
+
+
 def jit_inline_uncounted(function: Kernel) -> Kernel:
     """Compile a function that creates no arrays into each kernel that calls it, without reference counting."""
     return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))

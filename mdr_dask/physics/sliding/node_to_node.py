@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit, jit_inline, jit_uncounted
+from mdr_dask.physics.jit import jit, jit_inline, jit_inline_fused, jit_uncounted
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.cases import Cases, first_depths
 from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.waves import series
 
 BLOCK = 32  # number of cells in a block
 WING = 4  # a node of a finer grid is interpolated from this number of nodes on each side of the cell around it
@@ -60,33 +61,35 @@ class Nodes(NamedTuple):
     rise: float
 
 
-def _ends_of(height: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _ends_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
     """Return corrections of the trapezium rule for the integrals of the height and of the squared slope.
 
     The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
     at node j. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which are
     important for the integrals over small contacts.
     """
-    n = height.size
+    waves, slope = line.roughness.coefficients, line.nodes[1]
+    n = slope.size
     wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
-    factors = np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
-    # one array at a time: scipy takes three times as long for an array with two rows
-    return fft.irfft(fft.rfft(height) * factors, n), fft.irfft(fft.rfft((slope / n) ** 2) * factors, n)
+    factors = 1j * (1 / wave - 0.5 / np.tan(wave / 2))
+    squares = fft.rfft((slope / n) ** 2)
+    return series(waves * factors[: waves.size], n), fft.irfft(squares * np.append(0.0, factors), n)
 
 
-def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int) -> Nodes:
+def nodes(line: RoughLine, first: int, stride: int) -> Nodes:
     """Return the line that consists of every stride-th node of a line with two nodes per Nyquist point.
 
-    The line begins at node `first`. The argument `slope` is the derivative of the height with respect to x / L. If
-    `stride` > 2 (less than one node per Nyquist point), the slopes are differences of the heights instead.
+    The line begins at node `first`. If `stride` > 2 (less than one node per Nyquist point), the slopes are differences
+    of the heights.
     """
+    height, slope = line.nodes
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
     ends = np.empty((2, h.size if stride == 1 else 0))
-    corrections = _ends_of(height, slope) if stride == 1 else (ends[0], ends[1])
-    line = Nodes(h, s, ends, np.empty((n // BLOCK, 5)), float(height[first]), 0.0)
-    _write_nodes(height, slope, corrections, first, stride, line)
-    return line
+    corrections = _ends_of(line) if stride == 1 else (ends[0], ends[1])
+    taken = Nodes(h, s, ends, np.empty((n // BLOCK, 5)), float(height[first]), 0.0)
+    _write_nodes(height, slope, corrections, first, stride, taken)
+    return taken
 
 
 @jit
@@ -283,7 +286,7 @@ DRAG, FRACTION, CONTACT_SLOPE = range(3)
 SECANTS = 3
 
 
-@jit_inline
+@jit_inline_fused
 def _fading(time: float) -> float:
     """Return exp(-time) for time >= 0, with an error of at most 1e-4 for times up to 1."""
     y = time * 0.125
@@ -305,7 +308,7 @@ class Cell(NamedTuple):
     s1: float
 
 
-@jit_inline
+@jit_inline_fused
 def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
     """Return the penetration in cell i of a tile at a given depth."""
     h0, h1, s0, s1 = tile[HEIGHT, i + 1], tile[HEIGHT, i + 2], tile[SLOPE, i + 1], tile[SLOPE, i + 2]
@@ -313,19 +316,19 @@ def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
     return Cell(depth + h0, s0, 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise, depth + h1, s1)
 
 
-@jit_inline
+@jit_inline_fused
 def _at(cell: Cell, x: float) -> float:
     """Return w at x."""
     return cell.w0 + x * (cell.s0 + x * (cell.a + x * cell.b))
 
 
-@jit_inline
+@jit_inline_fused
 def _tilt(cell: Cell, x: float) -> float:
     """Return w' at x."""
     return cell.s0 + x * (2 * cell.a + x * 3 * cell.b)
 
 
-@jit_inline
+@jit_inline_fused
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
@@ -348,7 +351,7 @@ def _contact_end(
     return x, crest, _fading((1 - x) * inverse)
 
 
-@jit_inline
+@jit_inline_fused
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return the place where a free element meets the line, and the fraction of its displacement u that remains there.
 
@@ -370,7 +373,7 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
     return root + step, waited * max(1 - step * inverse, 0.0)
 
 
-@jit_inline
+@jit_inline_fused
 def _contact_in_cell(
     cell: Cell, r: float, u: float, kept: float, inverse: float
 ) -> tuple[bool, float, float, float, float]:
@@ -624,8 +627,7 @@ class NodeToNode:
     """
 
     def __init__(self, line: RoughLine, cases: Cases, error: float) -> None:
-        self._height, self._slope = line.nodes
-        self._cases, self._error = cases, error
+        self._rough, self._cases, self._error = line, cases, error
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
         self._depth = np.full(loads.size, np.nan)  # penetration of the mean line
@@ -639,8 +641,8 @@ class NodeToNode:
         if level == 1:
             return self._start()
         if level == 2:
-            cell, _ = highest_point(self._height, self._slope)
-            self._line = with_summit(nodes(self._height, self._slope, (cell + 1) % self._height.size, 1))
+            cell, _ = highest_point(*self._rough.nodes)
+            self._line = with_summit(nodes(self._rough, (cell + 1) % (2 * self._rough.points), 1))
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
         depths = np.where(depths > 0, depths, first_depths(some.loads))
@@ -650,7 +652,7 @@ class NodeToNode:
 
     def _start(self) -> Solution:
         """Solve all cases on finer and finer grids; the last grid has one node per Nyquist point."""
-        height, loads = self._height, self._cases.loads
+        height, loads = self._rough.nodes[0], self._cases.loads
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
             strides.append(strides[-1] * COARSENING)
@@ -658,7 +660,7 @@ class NodeToNode:
         highest = int(np.argmax(height))
         for stride in reversed(strides):
             results.fill(np.nan)
-            line = nodes(height, self._slope, highest, stride)
+            line = nodes(self._rough, highest, stride)
             _search(line, weights(1), self._cases, FIRST_STEP, FIRST_ERROR, depths, self._rates, results)
         self._depth = depths - line.top
         return self._solution(results, self._depth, 1)
@@ -673,7 +675,7 @@ class NodeToNode:
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):
-            cells = fraction * (self._height.size // 2 * level)
+            cells = fraction * (self._rough.points * level)
             resolved = (drag > 0) & (cells >= RESOLVED)
             patch = np.where(resolved, 1.0 / cells, np.inf)
         outcome = np.where(resolved, np.int8(Outcome.CONVERGED), np.int8(Outcome.DEPTH_NOT_FOUND))
