@@ -144,7 +144,7 @@ def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatA
     written[BEFORE + n :] = written[BEFORE : BEFORE + AFTER]
 
 
-@jit
+@jit_uncounted
 def _integrals(
     h: FloatArray,
     s: FloatArray,
@@ -176,7 +176,7 @@ def _integrals(
         square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + square[k] - square[k + 1]
 
 
-@jit
+@jit_uncounted
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
     """Write the largest height in each cell; the first cell begins at the second node of `h`."""
     for k in range(cells):
@@ -236,19 +236,20 @@ def weights(refinement: int) -> FloatArray:
     return table
 
 
-@jit
+@jit_uncounted
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
     """Write heights and slopes at the nodes of a finer grid in the given cells, and at one fine node on each side."""
     refinement = weights.shape[1]
-    h, s = line.height, line.slope
-    for place in range(-1, cells * refinement + 2):
-        cell = place // refinement
-        step, i = place - cell * refinement, first + cell + 1 - WING
-        value, rate = 0.0, 0.0
-        for k in range(2 * WING):
-            value += weights[0, step, k] * h[i + k] + weights[0, step, 2 * WING + k] * s[i + k]
-            rate += weights[1, step, k] * h[i + k] + weights[1, step, 2 * WING + k] * s[i + k]
-        height[place + 1], slope[place + 1] = value, rate / refinement
+    for step in range(refinement):
+        # the first node is in the cell before the given cells, the last two nodes in the cell after them
+        for cell in range(-1 if step == refinement - 1 else 0, cells + 1 if step < 2 else cells):
+            h, s = line.height[first + cell + 1 - WING :], line.slope[first + cell + 1 - WING :]
+            value, rate = 0.0, 0.0
+            for k in range(2 * WING):
+                value += weights[0, step, k] * h[k] + weights[0, step, 2 * WING + k] * s[k]
+                rate += weights[1, step, k] * h[k] + weights[1, step, 2 * WING + k] * s[k]
+            place = cell * refinement + step + 1
+            height[place], slope[place] = value, rate / refinement
 
 
 def with_summit(line: Nodes) -> Nodes:
