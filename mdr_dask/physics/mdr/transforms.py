@@ -128,9 +128,7 @@ def pressure(
     contact_radius: float,
     *,
     edge_gap: float = 0.0,
-    breaks: Sequence[float] = (),
     jumps: Sequence[tuple[float, float]] = (),
-    tolerance: float = 1e-10,
 ) -> Estimate:
     """Return the contact pressure divided by the effective modulus (thesis eq. 2.11).
 
@@ -147,12 +145,8 @@ def pressure(
     edge_gap : float
         Jump of the line load at the edge, which is the value of d - g just inside the edge. Under a flat punch this
         jump is not zero.
-    breaks : sequence of float
-        Places where a derivative of g jumps.
     jumps : sequence of (position, height)
         Positions inside the contact where g itself jumps, and the heights of the jumps.
-    tolerance : float
-        Allowed error, relative to the largest value.
 
     Returns
     -------
@@ -162,13 +156,12 @@ def pressure(
     r = np.atleast_1d(np.asarray(radius, dtype=float))
     inside = r < contact_radius
     ring = np.where(inside, np.maximum(r, 1e-12 * contact_radius), contact_radius)
-    cuts = [0.0, *sorted(b for b in breaks if 0.0 < b < contact_radius), contact_radius]
-    edges = np.stack([np.arccosh(np.maximum(cut / ring, 1.0)) for cut in cuts], axis=1)
+    edges = np.stack([np.zeros_like(ring), np.arccosh(contact_radius / ring)], axis=1)
 
     def integrand(angle: FloatArray) -> FloatArray:
         return image_slope(np.minimum(ring[:, None, None] * np.cosh(angle), contact_radius)) / np.pi
 
-    value, error = _integrate(integrand, edges, tolerance)
+    value, error = _integrate(integrand, edges)
     for place, height in [*jumps, (contact_radius, edge_gap)]:
         ahead = inside & (r < place)
         value[ahead] += height / (np.pi * np.sqrt((place - r[ahead]) * (place + r[ahead])))
@@ -179,17 +172,17 @@ def pressure(
     return Estimate(np.where(inside, value, 0.0), np.where(inside, error, 0.0))
 
 
-def volume(image: Function, radius: float, *, breaks: Sequence[float] = (), tolerance: float = 1e-10) -> Estimate:
+def volume(image: Function, radius: float) -> Estimate:
     """Return the volume under a profile f from r = 0 to the radius R, computed from the image g.
 
     The volume is int_0^R 2 pi r f dr = 4 int_0^R g sqrt(R^2 - x^2) dx.
     """
-    edges = _angles(np.array([radius]), breaks)
+    edges = _angles(np.array([radius]), ())
 
     def integrand(angle: FloatArray) -> FloatArray:
         return 4.0 * image(radius * np.sin(angle)) * (radius * np.cos(angle)) ** 2
 
-    return _integrate(integrand, edges, tolerance)
+    return _integrate(integrand, edges)
 
 
 def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
@@ -202,7 +195,7 @@ def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def _integrate(integrand: Function, edges: FloatArray, tolerance: float) -> Estimate:
+def _integrate(integrand: Function, edges: FloatArray, tolerance: float = 1e-10) -> Estimate:
     """Return the integral over all pieces; the number of nodes is doubled until two successive results agree."""
     nodes = 8
     coarse = _gauss_sum(integrand, edges, nodes)

@@ -29,7 +29,6 @@ COARSEST = 64  # the search for the depth starts on a grid with at most this num
 # The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is an
 # estimate of the relative error of the drag, which is extrapolated over the last step of the depth.
 CONVERGED = 1e-9
-EXACT_STEP = 1e-13  # the search also ends after a relative step of this size, which is a rounding error
 COARSE = 1e-3  # used instead of CONVERGED on all grids except the finest
 
 BLOCK = 256  # number of nodes in a block
@@ -246,7 +245,7 @@ def _newton(
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
             earlier = before[0, k] - depth[k]
-            if abs(step) <= EXACT_STEP * depth[k] or abs(step * earlier) <= tolerance * depth[k] ** 2:
+            if abs(step * earlier) <= tolerance * depth[k] ** 2:
                 change = (before[1, k] - drag) / earlier * step if abs(earlier) > 0 else 0.0
                 depths[case] = depth[k] + step
                 drags[case] = drag + change

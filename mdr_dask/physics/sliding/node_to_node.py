@@ -269,8 +269,6 @@ ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
 LAST_STEP = 0.03  # the search ends after a step of at most this fraction of the depth; results are extrapolated
 SECANT_ERROR = 0.1  # assumed error of the extrapolation over the last step, divided by the extrapolated change
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # in `_start`, used instead of LAST_STEP and of the allowed error of the drag
-ROUNDING = 1e-12  # smaller relative steps of the depth are rounding errors
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
@@ -560,7 +558,6 @@ def _search(
     line: Nodes,
     weights: FloatArray,
     cases: Cases,
-    last_step: float,
     error: float,
     depths: FloatArray,
     rates: FloatArray,
@@ -568,7 +565,7 @@ def _search(
 ) -> None:
     """Find the depths of cases on a grid by Newton's method; extrapolate the results over the last step of the depth.
 
-    The search ends after a step of at most `last_step` times the depth, if the extrapolation changes the drag so little
+    The search ends after a step of at most `LAST_STEP` times the depth, if the extrapolation changes the drag so little
     that the estimated relative error of the drag is at most `error`. `depths` contains the penetrations of the summit;
     the first guesses are replaced by the solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms
     of the results with respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS),
@@ -603,10 +600,10 @@ def _search(
                 for j in range(SECANTS):
                     rate[j] = (1 - last[k, j] / now[j]) / step_before[k]
                     rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
-                    if size < ROUNDING and not math.isfinite(rate[j]):
+                    if depth + step == depth and not math.isfinite(rate[j]):
                         rate[j] = 0.0
                 closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
-                if size <= last_step and SECANT_ERROR * abs(rate[DRAG] * step) <= error and closes:
+                if size <= LAST_STEP and SECANT_ERROR * abs(rate[DRAG] * step) <= error and closes:
                     depths[case] = depth + step
                     for j in range(SECANTS):
                         rates[case, j] = rate[j]
@@ -647,7 +644,7 @@ class NodeToNode:
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
         depths = np.where(depths > 0, depths, first_depths(some.loads))
-        _search(self._line, weights(level // 2), some, LAST_STEP, self._error, depths, rates, results)
+        _search(self._line, weights(level // 2), some, self._error, depths, rates, results)
         self._depth[cases], self._rates[cases] = depths - top, rates
         return self._solution(results, depths - top, level)
 
@@ -662,7 +659,7 @@ class NodeToNode:
         for stride in reversed(strides):
             results.fill(np.nan)
             line = nodes(self._rough, highest, stride)
-            _search(line, weights(1), self._cases, FIRST_STEP, FIRST_ERROR, depths, self._rates, results)
+            _search(line, weights(1), self._cases, self._error, depths, self._rates, results)
         self._depth = depths - line.top
         return self._solution(results, self._depth, 1)
 

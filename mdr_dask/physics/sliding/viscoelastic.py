@@ -17,7 +17,6 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution, refine
 from mdr_dask.physics.sliding.viscoelastic_sweep import (
-    CLOSED,
     Passage,
     Travelling,
     begin_recovery,
@@ -352,7 +351,7 @@ def solve_sliding(
         for i in range(nodes):
             penetration[i] = unknown[terms] + profile[i]
         start = unknown[:terms]
-        pieces, end = sweep_line(penetration, start, solid, not periodic, passage, of_sweep)
+        pieces, ends_in_contact = sweep_line(penetration, start, solid, not periodic, passage, of_sweep)
         found = passage.lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:
@@ -376,5 +375,5 @@ def solve_sliding(
         if not np.isfinite(largest):
             break
         if largest <= TOLERANCE * unknown[terms] + rounding:
-            return Outcome.CONVERGED if periodic or end == CLOSED else Outcome.OUTSIDE_LINE
+            return Outcome.CONVERGED if periodic or not ends_in_contact else Outcome.OUTSIDE_LINE
     return Outcome.DEPTH_NOT_FOUND

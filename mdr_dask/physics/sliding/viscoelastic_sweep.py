@@ -15,8 +15,6 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 
-CLOSED, OPEN_END = 0, 1
-
 
 class Travelling(NamedTuple):
     """A sliding solid and its recovery modes.
@@ -188,13 +186,12 @@ def sweep_line(
     undeformed: bool,
     passage: Passage,
     workspace: FloatArray,
-) -> tuple[int, int]:
+) -> tuple[int, bool]:
     """Move an element once along the line, and write the lengths and integrals to `passage`.
 
     `start` contains the stretches e_m at the first node, for an element whose displacement is the penetration there. If
     `undeformed` is True, elements enter undeformed and out of contact instead. `workspace` has the shape (10,
-    max(terms, 1)). Return the number of lengths, and whether the element is free (CLOSED) or in contact (OPEN_END) at
-    the last node.
+    max(terms, 1)). Return the number of lengths, and whether the element is in contact at the last node.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -224,14 +221,14 @@ def sweep_line(
         if contact < 0:
             for k in range(terms):
                 totals[5] += modes[k] * times[k]
-            return pieces, CLOSED
+            return pieces, False
         if int(goal) >= last:
-            return pieces, OPEN_END
+            return pieces, True
         place, strain, pressure, left = _contact(goal, penetration, moduli, deborah, imbalance, totals, workspace)
         lengths[pieces] = place - goal
         pieces += 1
         if not left:
-            return pieces, OPEN_END
+            return pieces, True
         node = int(workspace[2, 0])
         begin_recovery(strain, pressure / glass, e, moduli, modes, amplitude_of)
         is_free = True
