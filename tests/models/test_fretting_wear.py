@@ -124,6 +124,16 @@ def test_profiles_that_end_inside_the_scar_are_named(settings, outputs, said):
     assert bool(said) == bool(result.messages)
 
 
+def test_operations_count_the_cases_of_both_kinds():
+    def count(hold, columns):
+        given = FrettingWear(**STEEL | {"wear_rule": "limit", "hold": hold})
+        return MODEL.operations(Block(given, columns, 2, (0,), 1, ("worn_profile",)))
+
+    separate = count("depth", {}) + count("force", {})
+    both = {"hold": np.array(["depth", "force"])}
+    assert count("depth", both) == count("force", both) == separate
+
+
 def test_a_history_may_slip_everywhere():
     history = (LoadStep(cycles=1e4),)
     steel = {name: value for name, value in STEEL.items() if name != "cycles"} | {"amplitude": 1e-4}

@@ -97,12 +97,18 @@ def operations(block: Block[FrettingWear]) -> float:
     if parameters.history:
         return 120.0 * parameters.cells**3 * size  # 12 n^2 in each of about 10 n steps on n cells
     numbers, _ = reduce_block(block)
-    moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
     of_profiles = 1e4 * parameters.points  # integrals over about 20 pieces with 24 nodes
-    if parameters.wear_rule != "exact" and parameters.hold == "depth":
-        return of_profiles * moments
-    solution = exact_operations(_first_resolution(block.accuracy), constant_force=parameters.hold == "force")
-    return 3 * (solution * _count(numbers.exponent, numbers.level) + of_profiles * moments)  # two more for the errors
+    total = 0.0
+    for force in (False, True):
+        held = np.asarray((block.column("hold") == "force") == force)
+        marched = held & np.asarray(force | (block.column("wear_rule") == "exact"))
+        if marched.any():
+            solution = exact_operations(_first_resolution(block.accuracy), constant_force=force)
+            total += solution * _count(numbers.exponent[marched], numbers.level[marched])
+        if held.any():
+            every = numbers.exponent, numbers.level, numbers.cycles, numbers.xi
+            total += of_profiles * _count(*(part[held] for part in every))
+    return 3 * total  # two more solutions for the errors
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
