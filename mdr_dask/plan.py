@@ -84,9 +84,9 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes on the parameters of the series, and on some values of every axis."""
+        """Notes on some values of every axis of the series, or on its parameters if it has no axis."""
         base = self.series.parameters
-        sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
+        sets = [with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some] or [base]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
         return tuple(dict.fromkeys((*of_parts, *models.load(self.campaign.model).notes(sets))))
 

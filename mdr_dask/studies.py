@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from mdr_dask import aggregation, campaign, fits, plots, store
+from mdr_dask import aggregation, campaign, fits, models, plots, store
 from mdr_dask.bars import reporter
 from mdr_dask.campaign import Campaign
 from mdr_dask.campaign.keys import of_keys
@@ -411,10 +411,11 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign. A temporary store is named after a digest of the campaign."""
+    """Return the path of the store of a campaign. A temporary store is named after its campaign and model."""
     if not is_temporary:
         return found.store
-    digest = hashlib.sha256(found.text.encode()).hexdigest()[:16]
+    made_by = f"{models.load(found.model).version} {models.source_digest(found.model)}"
+    digest = hashlib.sha256(f"{found.text} {made_by}".encode()).hexdigest()[:16]
     return str(_temporary_folder() / f"{found.name}-{digest}.zarr")
 
 

@@ -15,8 +15,9 @@ import xarray as xr
 import mdr_dask
 from mdr_dask import execute, fits, models, units
 from mdr_dask.cli import main
-from mdr_dask.errors import ModelError
+from mdr_dask.errors import MachineError, ModelError
 from mdr_dask.execute import Resources
+from mdr_dask.execute.children import children
 from mdr_dask.fits.base import Fit
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.per_case import per_case
@@ -63,6 +64,30 @@ def test_a_changed_function_with_the_same_version_is_noticed(example, caplog):
         del sys.modules["wear_rate"]
         assert main(["run", "pin.yaml", "--quiet"]) == 0
         assert ("the file of the model wear_rate:MODEL has changed" in caplog.text) == is_noticed
+
+
+def test_a_module_that_changed_after_its_import_is_refused_until_it_is_reloaded(example):
+    campaign = {"model": "wear_rate:MODEL", "parameters": {"normal_force": 1, "sliding_distance": 1, "hardness": 1e9}}
+    first = mdr_dask.run(campaign, progress=False)
+    changed = MODULE.replace("    volume =", "    volume = 2 *").replace("version=1", "version=2")
+    (example / "wear_rate.py").write_text(changed)
+    with pytest.raises(ModelError, match="restart Python"):
+        mdr_dask.run(campaign, progress=False)
+    importlib.reload(sys.modules["wear_rate"])
+    again = mdr_dask.run(campaign, progress=False)
+    np.testing.assert_allclose(again.wear_volume, 2 * first.wear_volume)
+
+
+def test_workers_import_from_the_current_folder_only_what_their_parent_imports(example, monkeypatch):
+    (example / "enum.py").write_text("1 / 0")
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if Path(each or ".").resolve() != example])
+    with children(1, "ehl_line") as (child,):
+        assert child.server.poll() is None
+    (example / "bad").mkdir()
+    (example / "bad/enum.py").write_text("1 / 0")
+    monkeypatch.syspath_prepend(str(example / "bad"))
+    with children(1, "ehl_line") as (child,), pytest.raises(MachineError, match="ended with exit code 1"):
+        child.run("work")
 
 
 @pytest.mark.parametrize(

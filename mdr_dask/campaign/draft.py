@@ -125,6 +125,8 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
     info = parameters.model_fields[name]
     kinds = fields.members(info.annotation)
     unit = unit_of(parameters, name)
+    if listed := fields.listed(info):
+        return f"[{_structures(listed[0], set())[0]}]"
     default = None if info.is_required() else info.get_default(call_default_factory=True, validated_data={})
     if isinstance(default, int | float) and not isinstance(default, bool) and unit is not None:
         return shown(default, unit, 12)

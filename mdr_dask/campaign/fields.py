@@ -54,6 +54,13 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
     return tuple(kind for kind in kinds if kind is not DataFile)
 
 
+def listed(info: FieldInfo) -> tuple[type[BaseModel], ...]:
+    """Return the parameter sets that a field accepts as the entries of a list."""
+    lists = [kind for kind in members(info.annotation) if get_origin(kind) in (tuple, list)]
+    kinds = [kind for each in lists for part in get_args(each) for kind in members(part)]
+    return tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel) and kind != DataFile)
+
+
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 

@@ -165,17 +165,20 @@ def _rows(parameters: type[BaseModel], first: str) -> Iterator[dict[str, str]]:
     for path, kind, info in fields.walk(parameters):
         name = path.rpartition(".")[2]
         condition = ", ".join(f"{key}: {value}" for key, value in fields.fixed(kind).items())
-        nested = [
-            fields.written(each, dict.fromkeys(each.model_fields, "...")).replace(": ...", "")
-            for each in fields.structures(info)
-        ]
+        allowed = _allowed(_properties(kind)[name]).removesuffix(": ")  # the entries of a list may be parameter sets
+        nested, entries = (
+            [fields.written(each, dict.fromkeys(each.model_fields, "...")).replace(": ...", "") for each in kinds]
+            for kinds in (fields.structures(info), fields.listed(info))
+        )
         yield {
             first: path,
             "unit": unit_of(kind, name) or "",
             "default": _default(info),
-            "allowed": " or ".join(filter(None, [_allowed(_properties(kind)[name]), *nested])),
+            "allowed": " or ".join(filter(None, [": ".join(filter(None, [allowed, *entries])), *nested])),
             "meaning": f"({condition}) {info.description}" if condition else info.description or "",
         }
+        for each in fields.listed(info):
+            yield from ({**row, first: f"{path}[].{row[first]}"} for row in _rows(each, first))
 
 
 @lru_cache

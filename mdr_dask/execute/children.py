@@ -19,6 +19,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -50,9 +51,10 @@ class Crash:
 
 @dataclass(frozen=True)
 class Child:
-    """The pipe to a child process, which computes one block at a time."""
+    """The pipe to a child process, which computes one block at a time, and the server that has started the child."""
 
     pipe: Connection
+    server: subprocess.Popen[bytes]
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
         """Compute a block in the child process, with at most `limit` seconds for each result.
@@ -70,8 +72,10 @@ class Child:
                 return Crash(f"took longer than {limit:g} s")
             reply = self.pipe.recv()
         except (EOFError, OSError):
+            code = self.server.wait()  # the pipe breaks only when the server has ended
+            ended = "was killed" if code < 0 else f"ended with exit code {code} (its error is printed above)"
             raise MachineError(
-                "a process that computes blocks was killed; what is in the store is kept: run again"
+                f"the process that starts the workers {ended}; what is in the store is kept: run again"
             ) from None
         if isinstance(reply, Exception):
             raise reply
@@ -87,14 +91,14 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
     """
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
-    path = os.pathsep.join(filter(None, sys.path))
+    path = os.pathsep.join(str(Path(folder).absolute()) for folder in sys.path)
     environment = {**os.environ, **dict.fromkeys(BLAS_THREADS, "1"), "PYTHONPATH": path, KIND: kind()}
-    command = [sys.executable, "-c", COMMAND, model, *map(str, numbers)]
+    command = [sys.executable, "-P", "-c", COMMAND, model, *map(str, numbers)]
     with subprocess.Popen(command, pass_fds=numbers, env=environment, process_group=0) as process:
         try:
             for _, theirs in pipes:
                 theirs.close()
-            yield [Child(ours) for ours, _ in pipes]
+            yield [Child(ours, process) for ours, _ in pipes]
         except BaseException:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)

@@ -81,6 +81,7 @@ def run(
         from mdr_dask.fits.answers import require_known
 
         require_known(campaign)
+    models.require_current(campaign.model)
     stage = Stage.first(campaign)
     stored_layout(stage, url)  # if this raises an error, nothing has been locked yet
     url = store.absolute(url)  # a model may change the working directory later

@@ -63,15 +63,30 @@ def source_digest(name: str) -> str | None:
 
     Return None for a model of this package, or if the source file cannot be read.
     """
-    if not is_own(name):
-        return None
+    return _digest(load(name).compute) if is_own(name) else None
+
+
+def require_current(name: str) -> None:
+    """Raise ModelError if the file of a user's model has changed since this Python process imported the model."""
+    if is_own(name) and _digest_at_import(load(name).compute) != source_digest(name):
+        module = name.partition(":")[0]
+        raise ModelError(
+            f"the file of the model {name} has changed since this Python session imported it: restart Python, or call "
+            f"importlib.reload({module})"
+        )
+
+
+def _digest(compute: Callable[..., Any]) -> str | None:
     try:
-        file = inspect.getsourcefile(inspect.unwrap(load(name).compute))
+        file = inspect.getsourcefile(inspect.unwrap(compute))
         lines = map(str.strip, Path(file or "").read_text().splitlines())
     except (OSError, TypeError, ValueError):
         return None
     code = "\n".join(line for line in lines if line and not line.startswith("#"))
     return hashlib.blake2b(code.encode(), digest_size=8).hexdigest()
+
+
+_digest_at_import = lru_cache(_digest)  #: `_own` calls it first, directly after the import
 
 
 @lru_cache(maxsize=1)
@@ -92,6 +107,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
         raise ModelError(f"cannot load model {name!r}: {type(error).__name__}: {error}") from None
     if not isinstance(found, Model):
         raise ModelError(f"expected {name!r} to be an mdr_dask.models.base.Model, got {type(found).__name__}")
+    _digest_at_import(found.compute)
     others = ("operations", "memory", "distinct", "coordinates", "units", "notes")
     guarded: dict[str, Any] = {
         each: _guarded(name, each, getattr(found, each)) for each in others if getattr(found, each) is not None

@@ -57,7 +57,9 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     _require_version(url, campaign)
     if differences:
         lines = "\n  ".join(dict.fromkeys(differences))
-        raise StoreError(f"{url}: made from another campaign; give this one a store of its own (--store):\n  {lines}")
+        raise StoreError(
+            f"{url}: made from another campaign; give this one its own store (--store, in Python store=):\n  {lines}"
+        )
     extended, places = [], {}
     for series in campaign.series:
         if series.name in held:
@@ -80,7 +82,7 @@ def _require_version(url: str, campaign: Campaign) -> None:
         raise StoreError(
             f"{url}: made with version {held['model_version']} of the model {campaign.model} (mdr_dask {program}), "
             f"this is version {version}. The store can be read, plotted and verified, but not extended: use the "
-            f"version that made it, or compute the study again (--store with another name)"
+            f"version that made it, or compute the study again in another store (--store, in Python store=)"
         )
     source = models.source_digest(campaign.model)
     if source is not None and held.get("model_source") not in (None, source):

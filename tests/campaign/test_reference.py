@@ -13,6 +13,7 @@ from ruamel.yaml import YAML
 from mdr_dask import models
 from mdr_dask.campaign import json_schema, reference
 from mdr_dask.campaign.spec import CampaignSpec
+from mdr_dask.models.fretting_wear import MODEL as FRETTING
 
 VALID = Path(__file__).parent / "valid"
 
@@ -52,4 +53,6 @@ def test_reference_names_every_key_parameter_and_output(rubbing, monkeypatch):
         assert f"| `{output.name}` |" in page
     assert "| `indenter.angle` | rad | required | number > 0, < 1.5 | (shape: cone) inclination of the flank |" in page
     assert "| `hurst` | 1 | 0.7 | number ≥ 0, ≤ 1 | Hurst exponent |" in page
+    load_step = "list, each: {cycles, amplitude_factor, load_factor}"
+    assert any(load_step in row["allowed"] for row in reference.parameter_rows(FRETTING))
     assert "| `moduli` | Pa | [1000000] | list, each: number | moduli of the Prony series |" in page
