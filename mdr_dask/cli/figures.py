@@ -116,6 +116,7 @@ def plot(
             groups, figures = with_points(groups, figures, measured)
         for (name, figure), path in zip(figures.items(), places, strict=True):
             origin = provenance(name, urls, str(context.meta.get(COMMAND, "")))
+            origin |= {"warning": "; ".join(warnings)} if warnings else {}
             try:
                 description = figure.describe(groups)
             except (DataError, FitError) as error:
@@ -123,9 +124,8 @@ def plot(
                     raise
                 tell(f"{name}: left out: {error}")
                 continue
-            description.warnings += warnings
             description.leave_out([f"cases other than {where}"] * bool(where))
-            notes[path.name] = _save(description, path, origin)
+            notes[path.name] = [*_save(description, path, origin), *(f"warning: {text}" for text in warnings)]
             click.echo(str(path))
     _tell_notes(notes)
     if warnings:
@@ -264,10 +264,9 @@ def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[st
     with writing(render.table_beside(path)), writing(path):
         drawn.save(path)
     asked = page.current()
-    notes = [description.fixed] if asked.title is not None or asked.width is not None else []
-    notes += [f"not drawn: {text}" for text in description.left_out]
-    notes += [f"warning: {warning}" for warning in description.warnings]
-    return [labels.plain(note) for note in notes if note]
+    if asked.title is not None or asked.width is not None:
+        return description.caption()
+    return [labels.plain(note) for note in description.remarks()]
 
 
 def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:

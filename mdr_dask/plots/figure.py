@@ -178,21 +178,28 @@ class Figure:
         coords = (item for panel in self.panels for trace in panel.traces for item in trace.data.coords.items())
         return {str(name): str(value.attrs.get("units", "1")) for name, value in coords}
 
+    def caption(self) -> list[str]:
+        """Return the lines for a caption: the title, all fixed parameters, what is not drawn, and warnings."""
+        attrs = self.table().attrs
+        units, held = attrs["units"], attrs["held"].items()
+        fixed = [f"{name} = {_number(value)} {units[name]}".removesuffix(" 1") for name, value in held]
+        lines = [f"title: {'; '.join(part for part in (self.subject, self.fixed, self.bars) if part)}"]
+        lines += [f"held fixed: {', '.join(fixed)}"] * bool(fixed)
+        return list(map(plain, [*lines, *self.remarks()]))
+
+    def remarks(self) -> list[str]:
+        """Return a line for everything that is not drawn, and for every warning."""
+        rest = [f"not drawn: {text}" for text in self.left_out]
+        return [*rest, *(f"warning: {warning}" for warning in self.warnings)]
+
     def head(self, origin: Mapping[str, str]) -> list[str]:
-        """Return the comment lines above the table: `origin`, title, warnings, fixed parameters, units, and labels of
-        the panels.
+        """Return the comment lines above the table: `origin`, the lines of the caption, units, and labels of the
+        panels.
         """
         table = self.table()
         units = table.attrs["units"]
-        held = {
-            name: f"{_number(value)} {units[name]}".removesuffix(" 1") for name, value in table.attrs["held"].items()
-        }
         varied = [name for name in table if name in units]
-        lines = [f"{name}: {text}" for name, text in origin.items()]
-        lines.append(f"title: {'; '.join(part for part in (self.subject, self.fixed, self.bars) if part)}")
-        lines += [f"not drawn: {'; '.join(self.left_out)}"] * bool(self.left_out)
-        lines += [f"warning: {warning}" for warning in self.warnings]
-        lines += [f"held fixed: {', '.join(f'{name} = {value}' for name, value in held.items())}"] * bool(held)
+        lines = [*(f"{name}: {text}" for name, text in origin.items()), *self.caption()]
         lines += [f"units: {', '.join(f'{name} [{units[name]}]' for name in varied)}"] * bool(varied)
         for number, panel in enumerate(self.panels):
             parts = [f"x: {panel.x.label}", f"y: {panel.y.label}", panel.title]

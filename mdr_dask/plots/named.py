@@ -21,18 +21,18 @@ FIGURES: dict[str, dict[str, tuple[str, *tuple[View, ...]]]] = {
         ),
         "force": (
             "coefficient of friction against normal force",
-            View("friction_coefficient", "normal_force"),
+            View("friction_coefficient", "normal_force", log="xy"),
         ),
         "contact_growth": (
             "length and rms slope in contact against normal force",
-            View(("contact_fraction", "contact_slope"), "normal_force"),
+            View(("contact_fraction", "contact_slope"), "normal_force", log="xy"),
         ),
     },
     "mixed_lubrication": {
         "stribeck": (
             "friction, load share, contact, breakthrough and film ratio against speed",
             View(STRIBECK, "rotation_speed", log="x"),
-            View("film_ratio", "rotation_speed", guides={"film_ratio": FILM_RATIOS}),
+            View("film_ratio", "rotation_speed", log="xy", guides={"film_ratio": FILM_RATIOS}),
         ),
         "temperature": (
             "breakthrough probability against temperature",

@@ -252,14 +252,15 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
 
 
 def _title(figure: Drawn, description: Figure) -> float:
-    """Write the title and return its height in inches. At a requested size, only warnings are written."""
+    """Write the title and return its height in inches. At a requested size there is none, unless the user
+    gives one.
+    """
     asked = page.current()
-    if asked.title is not None:
+    if asked.title is not None or asked.width is not None:
         lines = [asked.title] if asked.title else []
     else:
         left_out = f"not drawn: {'; '.join(description.left_out)}" if description.left_out else ""
-        about = (description.subject, description.fixed, description.bars, left_out) if asked.width is None else ()
-        lines = [part for part in about if part]
+        lines = [part for part in (description.subject, description.fixed, description.bars, left_out) if part]
         lines += [f"warning: {warning}" for warning in description.warnings]
     if not lines:
         return 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,9 +41,10 @@ class View:
     `over` is the parameter on the horizontal axis; with two parameters, the figure is a map, and with none, it shows
     the main effects of all parameters. Colours show the values of the parameter `by`. There is one panel for each value
     of the parameter `panels`. `log` contains the letters of the logarithmic axes (x, y, and z for colours); by default,
-    an axis is logarithmic if its numbers are positive and span more than a factor of ten. If `single` is true, the
-    first realisation is drawn instead of the mean. If `apart` is true, every curve has its own panel. `guides` contains
-    the positions and names of horizontal lines for each output.
+    an axis is logarithmic if its numbers are positive and span more than a factor of ten, but an output that is a pure
+    number has a linear axis, and so has an output against a dimension of its own, such as a profile. If `single` is
+    true, the first realisation is drawn instead of the mean. If `apart` is true, every curve has its own panel.
+    `guides` contains the positions and names of horizontal lines for each output.
     """
 
     outputs: str | tuple[str, ...]
@@ -79,7 +80,7 @@ def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[s
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
-        own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
+        own = _own_dims(data, output)
         if own:
             return (own[0],)
         if any(_is_sampled(data, dim) for dim in curves.axes_of(data, output)):
@@ -87,6 +88,11 @@ def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[s
         found |= {name: max(found.get(name, 0), data[name].size) for name in varied(data, output)}
     left = [name for name in found if name not in without]
     return (max(left, key=lambda name: found[name]),) if left else ()
+
+
+def _own_dims(data: xr.Dataset, output: str) -> list[str]:
+    """Return the dimensions of an output within a single result, such as the positions of a profile."""
+    return [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
 
 
 class _Part(NamedTuple):
@@ -175,7 +181,7 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
 
 def _unfit(data: xr.Dataset, view: View, output: str) -> str:
     """Return the reason why a series cannot be drawn as requested, or an empty text if it can be drawn."""
-    own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
+    own = _own_dims(data, output)
     known = [*varied(data, output), *own]
     for name in (*view.along, view.by, view.panels):
         if name and name not in known:
@@ -232,12 +238,21 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
     return Axis(label, log=view.is_log(which, every, labels.quantity(name, first)), quantity=name)
 
 
+def _height(view: View, output: str, array: xr.DataArray, values: Any) -> Axis:
+    """Return the vertical axis of an output with the given values in the shown unit."""
+    is_linear = view.log is None and array.attrs.get("units", "1") == "1"
+    log = not is_linear and view.is_log("y", values, labels.quantity(output, array))
+    return Axis(labels.label(output, array), log, quantity=output)
+
+
 # curves
 
 
 def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     """Draw an output against one parameter."""
     along = view.along[0]
+    if view.log is None and any(along in _own_dims(data, output) for data in found.values()):
+        view = replace(view, log="")
     parts, left_out = _parts(found, view, output)
     x = _axis(along, [data[along] for data in found.values()], view, "x")
     families = [_families(part.series, view, output) for part in parts]
@@ -245,8 +260,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     first = next(iter(found.values()))
     drawn = [trace.column("y") for panel in panels for trace in panel.traces if trace.what == "data"]
     values = np.concatenate(drawn)
-    log = view.is_log("y", values, labels.quantity(output, first[output]))
-    y = Axis(labels.label(output, first[output]), log, quantity=output)
+    y = _height(view, output, first[output], values)
     for panel in panels:
         panel.y = y
         panel.traces += _guides(view.guides.get(output, {}), panel)
@@ -461,7 +475,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
         raise DataError(f"expected an output that varies with a parameter, got {output}")
     how = labels.quantity(output, data[output])
     cases = how.of(aggregation.mean(data[output]))
-    y = Axis(labels.with_unit(how.symbol, how.unit), view.is_log("y", cases, how), quantity=output)
+    y = _height(view, output, data[output], cases)
     panels = []
     for name in names[:MOST_EFFECTS]:
         dim = curves.along_dim(data, name, output) or name

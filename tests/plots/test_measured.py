@@ -6,7 +6,7 @@ import pytest
 
 from mdr_dask.errors import DataError
 from mdr_dask.fits.calibration import calibrate, measured_of, sentence, with_table
-from mdr_dask.plots import available, page
+from mdr_dask.plots import available
 from mdr_dask.plots.measured import with_points
 from mdr_dask.plots.render import render
 
@@ -79,8 +79,7 @@ def test_calibration_shows_what_the_fit_found(tmp_path):
     figure = available("sliding_friction")["calibration"].describe(given)
     assert figure.subject == f"calibration: {sentence(found)}"
     assert found.law_holds.startswith("no")
-    with page.drawing_for(page.requested("85mm")):
-        assert "the errors do not explain the residuals" in render(figure).get_suptitle().replace("\n", " ")
+    assert "the errors do not explain the residuals" in render(figure).get_suptitle().replace("\n", " ")
     data = [trace for trace in figure.panels[0].traces if trace.kind == "curve"]
     np.testing.assert_allclose(np.sort(np.concatenate([t.column("y") for t in data])), np.sort(found.measured.values))
     residuals = [trace for trace in figure.panels[1].traces if trace.kind == "curve"]

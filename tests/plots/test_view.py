@@ -57,6 +57,16 @@ def test_curves_are_the_means_with_their_intervals(groups):
     assert {key.label for key in figure.panels[0].keys} >= {"law (eq. 3.18)", "$F_N$ = 1 N"}
 
 
+def test_pure_numbers_and_profiles_have_linear_axes(groups):
+    data = groups[""]
+    force = data.assign({MU: data[MU].assign_attrs(units="N")})
+    profile = force.assign(status=data["status"].isel(velocity=0, drop=True))
+    for drawn, axes in ((data, (True, False)), (force, (True, True)), (profile, (False, False))):
+        panel = described({"": drawn}, MU, "velocity").panels[0]
+        assert (panel.x.log, panel.y.log) == axes
+    assert described(groups, MU, "velocity", log="xy").panels[0].y.log
+
+
 def test_without_by_a_second_axis_has_line_styles(groups):
     figure = described(groups, MU, "velocity")
     assert len(rows(figure).groupby(["normal_force", "hurst"])) == 10
