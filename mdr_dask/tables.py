@@ -441,7 +441,9 @@ def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | N
     if wrong:
         words = np.flatnonzero(grid.word[wrong[0]])
         column = int(next(iter([*(place for place in words if head.numeric[place : place + 1].any()), *words]), 0))
-        grid.require(wrong, column, f"expected a line of numbers, got {grid.cells[wrong[0], column][:60]!r}")
+        several = len({grid.lines[row].sheet for row in [*wrong, *kept]}) > 1
+        remedy = " (all sheets of a workbook are read as one table: delete the sheets of other tables)" * several
+        grid.require(wrong, column, f"expected a line of numbers, got {grid.cells[wrong[0], column][:60]!r}{remedy}")
     return kept, stated, tuple(grid.cells[row, first[row]] for row in between)
 
 

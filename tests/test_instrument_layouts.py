@@ -9,7 +9,7 @@ from instrument_layouts import DMA, READ, REFUSED, TRIOS
 
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
-from mdr_dask.tables import decoded, read_table
+from mdr_dask.tables import SHEET, decoded, read_table
 
 
 @pytest.mark.parametrize("layout", READ)
@@ -98,6 +98,12 @@ def test_a_text_in_a_workbook_is_a_number_only_if_its_decimal_mark_is_certain(ot
             read_table(text, "dma.xlsx", DMA)
     else:
         assert read_table(text, "dma.xlsx", DMA)["storage modulus"][1] == pytest.approx(1e6 * expected)
+
+
+def test_a_sheet_with_another_table_is_refused():
+    first, other = "f [Hz]\tE' [MPa]\tE'' [MPa]\n1\t2\t3\nMean\n", "pairing\tk\tmu\nA\t2\t3\n"
+    with pytest.raises(DataError, match="delete the sheets of other tables"):
+        read_table(f"{SHEET}1\n{first}{SHEET}2\n{other}", "pairs.xlsx", DMA)
 
 
 def test_workbooks_are_read_sheet_by_sheet():
