@@ -19,6 +19,7 @@ temperature, T, temp, temperatur, ts, tr
 frequency, f, freq, omega, w, ω, angular frequency, frequency angular, frequenz, kreisfrequenz
 time, t, zeit
 velocity, v, speed, sliding velocity, sliding speed, load point velocity, geschwindigkeit, gleitgeschwindigkeit
+mean velocity, mean speed, rolling velocity, rolling speed, entrainment velocity, entrainment speed, velocity, speed, v
 rotation speed, rotational speed, angular velocity, speed, n, drehzahl
 slide roll ratio, slide to roll ratio, srr
 storage modulus, e', g', storage, e storage, g storage, e stor, g stor, e1, g1, speichermodul
@@ -28,7 +29,9 @@ compliance, creep compliance, J, j(t)
 complex modulus, G*, E*, komplexer modul
 phase angle, delta, δ, phasenwinkel
 tan delta, tan d, tan δ, loss factor, damping factor, verlustfaktor
-friction coefficient, coefficient of friction, friction, coefficient, mu, μ, cof, reibwert, reibungszahl
+friction coefficient, traction coefficient, coefficient of friction, friction, coefficient, mu, μ, cof, reibwert, \
+reibungszahl
+friction force, traction force, tangential force, friction, reibkraft
 normal force, force, load, normal load, f n, F, kraft, normalkraft
 kinematic viscosity, nu, ν, viscosity, kinematische viskosität, viskosität
 dynamic viscosity, eta, η, mu, viscosity, dynamische viskosität, viskosität
@@ -56,7 +59,8 @@ _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
 
 @dataclass(frozen=True)
 class Column:
-    """The description of a column that a table may have. The table may also use one of the `SYNONYMS` of its name.
+    """The description of a column that a table may have. The table may also use one of the `SYNONYMS` of its name, or
+    one of `other_names`.
 
     The SI `unit` is ``"1"`` for pure numbers. Values must be greater than `above` and not smaller than `least`, in SI.
     `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of this
@@ -92,25 +96,27 @@ def _key(name: str) -> str:
 
 
 @lru_cache(maxsize=1024)
-def _names_of(*names: str) -> list[str]:
-    """Return names and all their synonyms."""
-    keys = {_key(name) for name in names}
-    return [*names, *(each for line in SYNONYMS if keys & set(map(_key, line)) for each in line)]
+def _names_of(name: str) -> list[str]:
+    """Return a name and all its synonyms. A mean velocity has synonyms of its own, a mean force those of a force."""
+    lines = [line for line in SYNONYMS if plain(name) in map(plain, line)]
+    lines = lines or [line for line in SYNONYMS if _key(name) in map(_key, line)]
+    return [name, *(each for line in lines for each in line)]
 
 
-def is_called(heading: str, *names: str) -> bool:
-    """Return whether a heading is one of the names or a synonym, perhaps abbreviated or followed by a symbol.
+def is_called(heading: str, name: str, *others: str) -> bool:
+    """Return whether a heading is a name, a synonym of this name, or another name, perhaps abbreviated or followed by a
+    symbol.
 
     For example, ``Storage modulus G'`` and ``Stor. mod.`` are names of the storage modulus.
     """
-    known = _names_of(*names)
+    known = [*others, *_names_of(name)]
     if _key(heading) in map(_key, known):
         return True
-    name, _, symbol = re.sub(r"[()]", " ", heading).strip().rpartition(" ")
-    if name and is_called(name, *names) and is_called(symbol, *names):
+    front, _, symbol = re.sub(r"[()]", " ", heading).strip().rpartition(" ")
+    if front and is_called(front, name, *others) and is_called(symbol, name, *others):
         return True
     parts = [re.escape(plain(part)) for part in re.split(r"(?<=\w{3})\.", heading)]
-    return len(parts) > 1 and any(re.fullmatch(r"\w* ?".join(parts), plain(name)) for name in known)
+    return len(parts) > 1 and any(re.fullmatch(r"\w* ?".join(parts), plain(each)) for each in known)
 
 
 def nearest(heading: str, names: Sequence[str]) -> str:
@@ -141,11 +147,20 @@ def split_unit(heading: str) -> tuple[str, str]:
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
     """Return the column that a name means, and the unit, which may be part of the name: mm/s in ``v_mm_s``.
 
-    The column is None if the name means none of the `columns`.
+    The column is None if the name means none of the `columns`. The exact name of a column comes first, then a synonym,
+    then another name; among columns of equal rank, the unit decides. If it does not decide, ValueError is raised.
     """
-    fitting = [column for column in columns if column.holds(name)]
-    if fitting:
-        return next((column for column in fitting if fits(unit, column)), fitting[0]), unit
+    exact = [column for column in columns if plain(name) == plain(column.name)]
+    synonyms = [column for column in columns if is_called(name, column.name)]
+    others = [column for column in columns if column.holds(name)]
+    for alike in ([column for column in rank if _agrees(unit, column)] for rank in (exact[:1], synonyms, others)):
+        if len(alike) > 1:
+            several = " or ".join(column.name for column in alike)
+            raise ValueError(f"expected the name of one quantity, got {name!r}, which may be {several}")
+        if alike:
+            return alike[0], unit
+    if found := exact or synonyms or ([] if unit else others):  # the unit is wrong or missing
+        return found[0], unit
     words = re.split(r"[\s_]", name)
     for count in range(len(words) - 1, 0, -1) if not unit else ():
         behind = [JOINED.get(word.casefold(), word) for word in words[count:]]
@@ -155,6 +170,10 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
                     return column, joined
     written = _BRACKETED.fullmatch(name)  # a text in brackets that is no known unit is still part of the name
     return match(written[1], written[3], columns) if written and not unit else (None, unit)
+
+
+def _agrees(unit: str, column: Column) -> bool:
+    return fits(unit, column) or (unit in ("", "-", "1") and column.unit == "1")
 
 
 def fits(unit: str, column: Column) -> bool:

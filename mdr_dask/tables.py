@@ -560,8 +560,11 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
             raise TableError(sheet.source, [sheet.head.problem(0, what)])
         return [(column, unit, False) for column, unit in zip(columns, sheet.units, strict=False)]
     found = []
-    for name, unit in zip(sheet.names, sheet.units, strict=True):
-        column, written = match(name, unit, columns)
+    for place, (name, unit) in enumerate(zip(sheet.names, sheet.units, strict=True)):
+        try:
+            column, written = match(name, unit, columns)
+        except ValueError as error:
+            raise TableError(sheet.source, [sheet.head.problem(place, str(error))]) from None
         logarithm = _LOGARITHM.fullmatch(name)
         if column is None and logarithm:
             inner, own = split_unit(re.sub(r"^\((.*)\)$", r"\1", logarithm[1].strip()))
@@ -614,7 +617,8 @@ def read_table(
         try:
             unit = _unit(written, column)
         except ValueError as error:
-            problems.append(sheet.head.problem(place, f"column {column.name}: {error}"))
+            got = f", got {f'{sheet.names[place]} [{written}]'!r}" if sheet.names and written else ""
+            problems.append(sheet.head.problem(place, f"column {column.name}: {error}{got}"))
             continue
         values, wrong = _values(sheet, place, column, unit, is_logarithm, allow_missing)
         problems += wrong
@@ -622,14 +626,12 @@ def read_table(
             read[column.name], taken[column.name] = values, place
         elif not wrong and not np.allclose(values, read[column.name], rtol=AGREE, atol=0, equal_nan=True):
             both = f"{sheet.names[taken[column.name]]!r} and {sheet.names[place]!r}"
-            what = f"column {column.name} is given twice: {both} disagree: delete one of the two"
+            what = f"column {column.name} is given twice: {both} disagree: delete one, or write it below the other"
             problems.append(sheet.head.problem(place, what))
     lacking = [f"a column {column.name}" for column in absent if column.needed]
     lacking += [", or ".join(" and ".join(each) for each in ways)] if way is None and ways else []
     if lacking and not problems:
-        got = f", got {', '.join(name for _, name in unknown)[:200]}" if unknown else ""
-        if any(re.match(_TEMPERATURE, name) for _, name in unknown):
-            got += " (write the temperatures into a column of their own)"
+        got = f", got {listed([name for _, name in unknown])}" if unknown else ""
         problems.append(sheet.head.problem(0, f"expected {' and '.join(lacking)}{got}"))
     if problems:
         raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
@@ -647,6 +649,13 @@ def read_table(
     read.lines = sheet.lines
     read.headings = {name: sheet.names[place] if sheet.names else "" for name, place in taken.items()}
     return read
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the names of columns as a text, with a remedy if there is a column for each temperature."""
+    by_temperature = any(re.search(_TEMPERATURE, name) for name in names)
+    hint = " (write the temperatures into a column of their own, and these columns one below the other)"
+    return (", ".join(filter(None, names))[:200] or "no names") + hint * by_temperature
 
 
 def _unit(written: str, column: Column) -> str:

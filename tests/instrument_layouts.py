@@ -179,7 +179,7 @@ REFUSED = {
         FRICTION, "write errors in a column of their own"),
     "unit in each cell": ("v [mm/s];mu\n1 mm/s;0,5\n", FRICTION, "write units in the line of names"),
     "one column for each temperature": ("f [Hz];20 °C;40 °C\n1;5;4\n2;6;5\n",
-        DMA, "expected a column storage modulus, got 20 °C, 40 °C (write the temperatures into a column of their own)"),
+        DMA, "expected a column storage modulus, got 20 °C, 40 °C (write the temperatures into a column of their own, and these"),
     "unknown unit in round brackets": ("v [mm/s],mu,Force (Newtons)\n1,0.5,10\n",
         FRICTION, "column normal force: unknown unit 'Newtons' (did you mean 'newton'?)"),
     "numbers below": ("v [mm/s];mu\n1;0,5\n2;0,6\n3;worn out\n",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.numbers import numbers_of
-from mdr_dask.tables import Line, Read, Sheet, read_sheet, read_table
+from mdr_dask.tables import AGREE, Line, Read, Sheet, listed, matched, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
@@ -29,6 +29,8 @@ _ERROR = re.compile(
 LARGEST = 10**6
 #: Conditions are equal if their relative difference is at most this.
 SAME = 1e-6
+#: The reason why the fit refuses a table with errors that are zero.
+ZERO = "the fit needs standard errors above 0: delete the column of errors, so that the fit estimates them"
 #: A message names at most this number of rows outside the ranges of a study.
 FEW = 3
 
@@ -57,35 +59,42 @@ def read_measured(
     conditions: Mapping[str, str],
     outputs: Mapping[str, str],
     axes: Mapping[str, ArrayLike] | None = None,
+    wanted: Collection[str] = (),
 ) -> Measured:
     """Read a table of measured points. `conditions` and `outputs` map names of possible columns to their SI units.
 
-    A heading may be short for a name: ``temperature`` means ``solid_temperature``, if every other name that ends in
-    ``temperature`` has more words. An axis without a column is an unknown parameter. DataError is raised if the numbers
-    of an unused column lie within the range of such an axis, because the column may be meant for this axis.
+    If the table contains several outputs, the one among `wanted` is read. A heading may be short for a name:
+    ``temperature`` means ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An
+    axis without a column is an unknown parameter. DataError is raised if the numbers of an unused column lie within the
+    range of such an axis, because the column may be meant for this axis.
     """
     sheet = read_sheet(text, source)
-    short = _short_names([*conditions, *outputs])
-    of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
-    found = [name for name, column in of_outputs.items() if any(column.holds(name) for name in sheet.names)]
-    if not found:
-        of_outputs = {name: Column(name, unit, short[name]) for name, unit in outputs.items()}
-        found = [name for name, column in of_outputs.items() if any(column.holds(name) for name in sheet.names)]
+    units = {**outputs, **conditions}
+    short = _short_names(units)
+    columns = [Column(name, unit, short[name], needed=False) for name, unit in units.items()]
+    present = {column.name for column, _, _ in matched(sheet, columns) if column} if sheet.names else set()
+    found = [name for name in outputs if name in present]
+    found = [name for name in found if name in wanted] or found
     if len(found) != 1:
         hint = "" if found else next(filter(None, (nearest(name, [*outputs]) for name in sheet.names)), "")
-        got = ", ".join(found or sheet.names) or "no names"
-        wanted = f"a column with one output of the study ({', '.join(outputs)})"
-        raise DataError(f"{source}: expected {wanted}, got {got}{hint}")
+        got = f"{' and '.join(found)}: delete all but one" if found else listed(sheet.names) + hint
+        what = f"a column with one output of the study ({', '.join(outputs)})"
+        raise DataError(f"{source}: expected {what}, got {got}")
     output = found[0]
-    columns = [Column(name, unit, short[name], needed=False) for name, unit in conditions.items()]
-    columns.append(of_outputs[output])
+    columns = [column for column in columns if column.name != output and column.name in present.union(axes or ())]
+    columns.append(Column(output, outputs[output], short[output]))
     headings, unit, is_relative = _error_of(sheet, columns)
     unit_of_errors = "1" if is_relative else outputs[output]
-    error = Column(ERROR, unit_of_errors, headings, needed=False, above=0.0, given_unit=unit)
+    error = Column(ERROR, unit_of_errors, headings, needed=False, least=0.0, given_unit=unit)
     read = read_table(text, source, [*columns, error], allow_missing=True)
     _require_names(read, source, conditions, axes or {})
+    others = [read.headings[name] for name in outputs if name in read and name != output]
+    for name in outputs.keys() - {output}:
+        read.pop(name, None)
     if is_relative and ERROR in read:
         read[ERROR] = read[ERROR] * np.abs(read[output])
+    not_used = f"outputs of the study, not used: {', '.join(others)}" if others else ""
+    read.remark = "; ".join(filter(None, (read.remark, not_used)))
     read.leave_out_incomplete()
     rows = dict(read)
     values, errors = rows.pop(output), rows.pop(ERROR, None)
@@ -93,6 +102,30 @@ def read_measured(
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
     of_errors = f"column {read.headings.get(ERROR, '')!r}{' (in % of the values)' if is_relative else ''}"
     return Measured(source, output, values, errors, rows, read.lines, of_errors, read.remark)
+
+
+def belonging(values: FloatArray, known: ArrayLike) -> FloatArray:
+    """Return the nearest known value of each value; NaN if they differ by more than `tables.AGREE`.
+
+    An instrument does not measure exactly the value that was set: 49.9 % belongs to 50 %.
+    """
+    set_values = np.atleast_1d(np.asarray(known, dtype=np.float64))
+    near = set_values[np.argmin(np.abs(values[:, None] - set_values), axis=1)]
+    return np.where(np.abs(values - near) <= AGREE * np.abs(near), near, np.nan)
+
+
+def scatter(measured: Measured, known: Mapping[str, ArrayLike]) -> Iterator[str]:
+    """Yield a sentence for each condition whose measured values are near the known values, but not equal to them."""
+    for name, values in known.items():
+        rows = measured.conditions[name]
+        away = np.abs(rows - (near := belonging(rows, values)))
+        count = int(np.count_nonzero(away > SAME * np.abs(near)))
+        if count:
+            most = 100 * float(np.nanmax(away / np.abs(np.where(near, near, np.nan))))
+            yield (
+                f"{count} of {rows.size} points differ in {name} by up to {most:.2g} % from the nearest value of the "
+                "study, and count as points at this value"
+            )
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
@@ -139,6 +172,7 @@ def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapping[str, ArrayLike]) -> None:
     """Raise DataError if the numbers of an unused column lie within the range of an axis that has no column."""
+    wrong = []
     for axis in [name for name in axes if name not in read]:
         ends = np.asarray(axes[axis], dtype=np.float64)
         low, high = ends.min() - SAME * abs(ends.min()), ends.max() + SAME * abs(ends.max())
@@ -149,7 +183,9 @@ def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapp
             values = before * (numbers[np.isfinite(numbers)] * factor + zero)
             if values.size and low <= values.min() and values.max() <= high:
                 what = f"column {heading!r} is not used, but may be {axis}, which is an unknown if it has no column"
-                raise DataError(f"{source}: {what}: name the column {axis}, or delete it")
+                wrong.append(f"{source}: {what}: name the column {axis}, or delete it")
+    if wrong:
+        raise DataError("\n".join(wrong))
 
 
 def require_readable(table: DataFile, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
@@ -203,12 +239,16 @@ def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
         yield found.remark
     yield f"conditions {', '.join(ranges.values()) or 'none'}"
     yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
+    reach_of = _reach(model, series, found.conditions)
+    yield from scatter(found, {name: low for name, (low, high) in reach_of.items() if low == high})
+    if found.errors is not None and not found.errors.all():
+        yield ZERO
     outside = [
         f"{line}, {name} {shown(float(value), units[name])} (study: {shown(low, units[name])} to "
         f"{shown(high, units[name])})"
-        for name, (low, high) in _reach(model, series, found.conditions).items()
+        for name, (low, high) in reach_of.items()
         for line, value in zip(found.lines, found.conditions[name], strict=True)
-        if not low - SAME * abs(low) <= value <= high + SAME * abs(high)
+        if not low - AGREE * abs(low) <= value <= high + AGREE * abs(high)
     ]
     more = f", ... ({len(outside)} in all)" if len(outside) > FEW else ""
     refused = (

@@ -55,8 +55,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
         try:
             require_readable(measured, spec.model, outputs, series)
         except DataError as error:
-            for line in str(error).splitlines():
-                document.report(("measured", "table"), line)
+            document.report(("measured", "table"), "; ".join(str(error).splitlines()))
     document.problems.raise_if_any(remarks)
     return Campaign(
         name=spec.name,

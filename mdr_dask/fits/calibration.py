@@ -5,7 +5,7 @@ The unknowns are the axes of the study that are not columns of the table of meas
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -17,10 +17,11 @@ import xarray as xr
 from scipy.special import gammaincinv
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.campaign.measured import Measured, read_measured, unknowns
+from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter, unknowns
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import identifiability
 from mdr_dask.fits.base import DOUBTFUL, Fit
+from mdr_dask.fits.interpolation import FEWEST
 from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, likelihood, posterior
 from mdr_dask.fits.prediction import Prediction, prediction
@@ -132,6 +133,8 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     If the table contains no measurement errors, the logarithm of their size has a uniform prior. The measurement errors
     are then assumed to be either equal for all points, or proportional to the predicted values.
     """
+    if measured.errors is not None and not measured.errors.all():
+        raise FitError(f"{measured.source}: {ZERO}")
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
     units = {name: str(dataset[name].attrs.get("units", "1")) for name in named}
@@ -192,8 +195,8 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
 
 
-def measured_of(dataset: xr.Dataset) -> Measured:
-    """Return the measured points that are stored with a study."""
+def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
+    """Return the measured points that are stored with a study. If the table has several outputs, one of `wanted`."""
     table = dataset.attrs.get("measured")
     if not table:
         raise FitError(
@@ -211,7 +214,7 @@ def measured_of(dataset: xr.Dataset) -> Measured:
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
     axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim}
-    return read_measured(table["text"], table["name"], conditions, outputs, axes)
+    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:
@@ -232,6 +235,8 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     measured = measured_of(dataset)
     meaning = dataset[measured.output].attrs.get("long_name", measured.output)
     compared = f"{measured.values.size} points, compared with {measured.output}: {meaning}"
+    few = {name: dataset[name].to_numpy() for name in measured.conditions if dataset[name].size < FEWEST}
+    compared = "; ".join([compared, *scatter(measured, few)])
     return summary(calibrate(dataset, measured)).assign(measured=((), compared, {"units": "1"}))
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import aggregation, bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.measured import Measured
+from mdr_dask.campaign.measured import Measured, belonging
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown_apart
@@ -20,7 +20,8 @@ from mdr_dask.units import shown_apart
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-#: Relative difference up to which a measured and a computed value of a parameter count as equal.
+#: Relative difference up to which a measured and a computed value of a parameter count as equal. If the study has too
+#: few values for an interpolation, `AGREE` is used.
 SAME = 1e-6
 #: All cases use the same rough lines, so that a few modes represent the scatter of all cases. `MODES`: largest number
 #: of modes. `SHARE`: share of the variance that the modes must represent.
@@ -114,11 +115,10 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
         held = dataset[name]
         if held.ndim == 0:
             ends = [float(held)]
-            off = ~np.isclose(wanted, float(held), rtol=SAME, atol=0)
+            off = np.isnan(belonging(wanted, ends))
         else:
             low, high = ends = [float(held.min()), float(held.max())]
-            slack = SAME * max(abs(low), abs(high))
-            off = (wanted < low - slack) | (wanted > high + slack)
+            off = ((wanted < low) | (wanted > high)) & np.isnan(belonging(wanted, ends))
         if off.any():
             worst = int(np.flatnonzero(off)[0])
             measured_at, *known = shown_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
@@ -147,6 +147,8 @@ def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
 
 def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
     """Return whether all `wanted` values are computed values of the axis."""
+    if axis.size < FEWEST:
+        return bool(np.isfinite(belonging(wanted, axis)).all())
     nearest = np.min(np.abs(wanted[:, None] - axis), axis=1)
     return bool(np.all(nearest <= SAME * np.maximum(np.abs(wanted), np.abs(axis).max() * SAME)))
 

@@ -130,8 +130,8 @@ class Figure:
 
     With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form the next column; with ``stack = 1``, the
     panels fill row after row. `fixed` is a text with the fixed parameters, and `bars` is a text that explains the error
-    bars and bands. `left_out` are texts about results that are not drawn. `ratio` is the height of a panel divided by
-    its width. `share_y` gives all panels the same vertical axis.
+    bars and bands. `left_out` are texts about results that are not drawn. `notes` are texts for the caption and the
+    table. `ratio` is the height of a panel divided by its width. `share_y` gives all panels the same vertical axis.
     """
 
     panels: list[Panel]
@@ -140,6 +140,7 @@ class Figure:
     bars: str = ""
     left_out: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     stack: int = 1
     ratio: float = 0.7
     share_y: bool = False
@@ -188,9 +189,9 @@ class Figure:
         return list(map(plain, [*lines, *self.remarks()]))
 
     def remarks(self) -> list[str]:
-        """Return a line for everything that is not drawn, and for every warning."""
+        """Return a line for everything that is not drawn, every warning and every note."""
         rest = [f"not drawn: {text}" for text in self.left_out]
-        return [*rest, *(f"warning: {warning}" for warning in self.warnings)]
+        return [*rest, *(f"warning: {warning}" for warning in self.warnings), *self.notes]
 
     def head(self, origin: Mapping[str, str]) -> list[str]:
         """Return the comment lines above the table: `origin`, the lines of the caption, units, and labels of the

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.measured import Measured
+from mdr_dask.campaign.measured import SAME, Measured, belonging, scatter
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.calibration import measured_of, with_table
 from mdr_dask.plots import labels
@@ -18,8 +18,6 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: Largest relative difference between a measured condition and the parameter of a curve to which the point belongs.
-SAME = 1e-3
 #: Half width of a 95 % interval divided by the standard error.
 HALF = 1.96
 NAME = "measured"
@@ -47,10 +45,9 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
     """Add the measured points to the panels of a figure that show the measured output against a measured condition."""
     data = next(iter(groups.values()))
     try:
-        measured = measured_of(data)
+        measured = measured_of(data, [panel.y.quantity for panel in figure.panels])
     except FitError as error:
         raise DataError(str(error)) from None
-    figure.warnings += _apart(measured, data)
     panels = [p for p in figure.panels if p.y.quantity == measured.output and p.x.quantity in measured.conditions]
     if not measured.conditions:
         axes = ", ".join(str(name) for name in data["status"].dims if name != "realisation")
@@ -60,50 +57,58 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
         raise DataError(
             f"{measured.source} contains {measured.output} against {known}, but no panel of this figure has these axes"
         )
-    drawn = sum(_add(panel, measured, data) for panel in panels)
-    if drawn < measured.values.size:
-        rest = measured.values.size - drawn
-        counted = f"{rest} of {measured.values.size} measured points"
-        figure.leave_out([f"{counted}, whose conditions or values are far from those of the curves"])
+    drawn = np.any([_add(panel, measured, data) for panel in panels], axis=0)
+    along = {panel.x.quantity for panel in panels}
+    others = {name: np.atleast_1d(data[name]) for name in measured.conditions if name not in along}
+    if not drawn.all():
+        off = [name for name, known in others.items() if np.isnan(belonging(measured.conditions[name], known)).any()]
+        why = f"no curve has their {' or '.join(off)}" if off else "a logarithmic axis shows only numbers above 0"
+        figure.leave_out([f"{np.count_nonzero(~drawn)} of {drawn.size} measured points: {why}"])
+    figure.warnings += _apart(measured, data, [measured.output, *along])
+    bars = f"{measured.error_column} taken as one standard error" if measured.errors is not None else ""
+    texts = (bars, measured.remark, *scatter(measured, others))
+    figure.notes += [f"measured {measured.source}: {text}" for text in texts if text]
 
 
-def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
-    """Return a warning if the measured values are all above or all below the results of a study."""
-    low, high = float(data[measured.output].min()), float(data[measured.output].max())
-    if measured.values.min() <= high and measured.values.max() >= low:
-        return []
-    unit = str(data[measured.output].attrs.get("units", "1"))
-    ends = [shown(float(end), unit) for end in (measured.values.min(), measured.values.max(), low, high)]
-    return [
-        f"measured {measured.output} is {ends[0]} to {ends[1]}, the study has {ends[2]} to {ends[3]}: is the unit of "
-        "the table right?"
-    ]
+def _apart(measured: Measured, data: xr.Dataset, names: Sequence[str]) -> list[str]:
+    """Return a warning for each quantity whose measured values are all above or all below those of a study."""
+    warnings = []
+    for name in names:
+        values, known = measured.conditions.get(name, measured.values), data[name]
+        low, high = float(known.min()), float(known.max())
+        if values.min() > high or values.max() < low:
+            unit = str(known.attrs.get("units", "1"))
+            ends = [shown(float(end), unit) for end in (values.min(), values.max(), low, high)]
+            warnings.append(
+                f"measured {name} is {ends[0]} to {ends[1]}, the study has {ends[2]} to {ends[3]}: is the unit of the "
+                "table right?"
+            )
+    return warnings
 
 
-def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
-    """Add the measured points that belong to the curves of a panel, and return their number.
+def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> np.ndarray:
+    """Add the measured points that belong to the curves of a panel, and return a mask of these points.
 
     A point has the colour of its curve. Points are black if there is only one curve, or if the table lacks a parameter
     in which the curves differ.
     """
     curves = [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]
     if not curves:
-        return 0
+        return np.zeros(measured.values.size, dtype=bool)
     keys, points = panel.entries(), _points(panel, measured, data)
     differing = _differing([trace.data for trace in curves])
     of_curves = len(curves) > 1 and differing <= {*measured.conditions, panel.x.quantity}
-    drawn = {name: np.concatenate([trace.column(name) for trace in curves]) for name in "xy"}
-    near = _near(panel.x, drawn["x"], points["x"].to_numpy()) & _near(panel.y, drawn["y"], points["y"].to_numpy())
-    left = near.copy()
+    can_be_shown = _on(panel.x, points["x"].to_numpy()) & _on(panel.y, points["y"].to_numpy())
+    left = can_be_shown.copy()
     for trace in curves:
-        here = left & _at(trace.data, measured, panel.x.quantity)
+        here = left & _at(trace.data, measured, data, panel.x.quantity)
         if here.any():
             colour, name = (trace.colour, f"{NAME}, {trace.label}") if of_curves else ("#000000", NAME)
             own = points.isel(point=np.flatnonzero(here))
             panel.traces.append(Trace("curve", own, NAME, name, colour, "", "D", bars=True))
             left &= ~here
-    found = int((near & ~left).sum())
-    if found:
+    found = can_be_shown & ~left
+    if found.any():
         label = NAME if measured.errors is None else f"{NAME}, 95 %"
         if len(curves) == 1 and not curves[0].label:
             keys = [Key("study", curves[0].colour, curves[0].line, curves[0].marker), *keys]
@@ -118,26 +123,18 @@ def _differing(curves: list[xr.Dataset]) -> set[str]:
     return {name for name in names if len({each.get(name) for each in held}) > 1}
 
 
-def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
-    """Return a mask of the measured points whose conditions equal the parameters of a curve."""
+def _at(curve: xr.Dataset, measured: Measured, data: xr.Dataset, along: str) -> np.ndarray:
+    """Return a mask of the measured points whose conditions belong to the parameters of a curve."""
     here = np.ones(measured.values.size, dtype=bool)
     for name, values in measured.conditions.items():
         if name != along and name in curve.coords and curve[name].ndim == 0:
-            here &= np.isclose(values, float(curve[name]), rtol=SAME, atol=0)
+            here &= np.isclose(belonging(values, data[name]), float(curve[name]), rtol=SAME, atol=0)
     return here
 
 
-def _near(axis: Axis, drawn: FloatArray, places: FloatArray) -> np.ndarray:
-    """Return a mask of the measured points that are close enough to the curves along one axis.
-
-    If the curves go from 1 to 3, points from -1 to 5 are close enough; points farther away would squeeze the curves.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):  # a logarithmic axis cannot show zero or negative numbers
-        drawn, places = (np.log(each) if axis.log else each for each in (drawn, places))
-    low, high = drawn[np.isfinite(drawn)].min(), drawn[np.isfinite(drawn)].max()
-    spread = (high - low) or np.inf
-    near: np.ndarray = np.isfinite(places) & (places >= low - spread) & (places <= high + spread)
-    return near
+def _on(axis: Axis, places: FloatArray) -> np.ndarray:
+    """Return a mask of the numbers that an axis can show: a logarithmic axis cannot show zero or negative numbers."""
+    return np.isfinite(places) & ((places > 0) | (not axis.log))
 
 
 def _points(panel: Panel, measured: Measured, data: xr.Dataset) -> xr.Dataset:

@@ -91,3 +91,55 @@ def test_errors_in_percent_are_relative_unless_the_output_is_in_percent(unit, er
 def test_unknown_outputs_get_the_nearest_name(heading, output):
     with pytest.raises(DataError, match=rf"did you mean '{output}'"):
         read(f"velocity [m/s];{heading}\n1;0.1\n2;0.2\n")
+
+
+LUBRICATED = {"mean_velocity": "m/s", "boundary_friction": "1", "slide_roll_ratio": "1", "line_load": "N/m"}
+FRICTION = {"friction_coefficient": "1", "friction_force": "N"}
+
+
+@pytest.mark.parametrize(
+    ("headings", "conditions", "output"),
+    [
+        ("mean_velocity [m/s];friction_coefficient", ["mean_velocity"], "friction_coefficient"),
+        ("v [m/s];boundary_friction;CoF", ["boundary_friction", "mean_velocity"], "friction_coefficient"),
+        ("Speed [m/s];Friction", ["mean_velocity"], "friction_coefficient"),
+        ("Speed [m/s];Friction [mN]", ["mean_velocity"], "friction_force"),
+        (
+            "Rolling Speed [mm/s];Sliding Speed [mm/s];Traction Coefficient ( )",
+            ["mean_velocity"],
+            "friction_coefficient",
+        ),
+        ("Sliding Speed [mm/s];SRR [%];Load [N];mu", ["slide_roll_ratio"], "friction_coefficient"),
+    ],
+)
+def test_exact_names_precede_synonyms_and_units_decide_between_quantities(headings, conditions, output):
+    numbers = ";".join("12345"[: headings.count(";") + 1])
+    found = read_measured(f"{headings}\n{numbers}\n{numbers}\n", "rig.csv", LUBRICATED, FRICTION)
+    assert (sorted(found.conditions), found.output) == (conditions, output)
+
+
+def test_names_of_several_quantities_are_refused():
+    with pytest.raises(DataError, match="'Speed', which may be velocity or mean_velocity"):
+        read_measured("Speed [m/s];mu\n1;2\n", "rig.csv", {"velocity": "m/s", "mean_velocity": "m/s"}, FRICTION)
+
+
+def test_a_table_of_two_outputs_needs_the_wanted_one():
+    text = "velocity [m/s];CoF;Reibkraft [mN]\n1;0,3;5\n2;0,4;6\n"
+    with pytest.raises(DataError, match="got friction_coefficient and friction_force: delete all but one"):
+        read_measured(text, "rig.csv", CONDITIONS, FRICTION)
+    found = read_measured(text, "rig.csv", CONDITIONS, FRICTION, wanted=["friction_force", "contact_area"])
+    np.testing.assert_allclose(found.values, [5e-3, 6e-3])
+    assert "not used: CoF" in found.remark
+
+
+def test_a_column_for_each_temperature_has_a_remedy():
+    with pytest.raises(DataError, match=r"got v, µ 40°C, µ 100°C .*temperatures into a column of their own"):
+        read(";v [m/s];µ 40°C;µ 100°C\n1;1;0,3;5\n2;2;0,4;6\n")
+
+
+def test_columns_that_resemble_fixed_parameters_are_only_named():
+    text = "velocity [m/s];mu;Ball Load [N];Pot force [N]\n1;0,3;5;6\n2;0,4;6;6\n"
+    found = read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2)})
+    assert found.remark == "not used: Ball Load, Pot force"
+    with pytest.raises(DataError, match=r"(?s)Ball Load.*\n.*Pot force"):
+        read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2), "normal_force": (100, 200)})

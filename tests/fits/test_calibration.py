@@ -172,6 +172,7 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
         (RIG, {"relaxation_time": slice(3)}, "expected at least 4 values of the unknown relaxation_time, got 3"),
         (RIG, {"velocity": slice(3)}, "but this study has"),
         (RIG, {"relaxation_time": 0, "rms_roughness": 0}, "expected one to four axes of the study .*, got none"),
+        (RIG.replace("0.09, 0.001", "0.09, 0"), {}, "rig.csv: the fit needs standard errors above 0"),
         (RIG.replace(", standard_error", "").replace(", 0.001", ""), {}, "expected more than 2 measured points for 2"),
     ],
 )
@@ -179,6 +180,15 @@ def test_bad_input_is_refused_with_its_reason(text, change, message):
     data = study().isel(change).assign_attrs(measured={"name": "rig.csv", "text": text})
     with pytest.raises((DataError, FitError), match=message):
         calibration({"": data})
+
+
+def test_points_belong_to_the_nearest_value_of_a_condition_with_few_values():
+    rows = "".join(f"{force}, {v}, 0.1, 0.01\n" for force in (0.997, 1.004) for v in (0.000995, 0.00238))
+    text = f"{RIG.splitlines()[0]}\n{rows}"
+    data = study().isel(normal_force=2, velocity=[0, 1]).assign_attrs(measured={"name": "rig.csv", "text": text})
+    found = calibration({"": data})["measured"].item()
+    assert "4 of 4 points differ in normal_force by up to 0.4 %" in found
+    assert "4 of 4 points differ in velocity by up to 0.5 %" in found
 
 
 def test_a_study_without_a_table_half_filled_or_sampled_is_refused():

@@ -48,18 +48,39 @@ def test_points_without_the_parameter_of_the_curves_are_black(groups, tmp_path):
     assert "measured" in [key.label for key in figure.panels[0].keys]
 
 
-def test_points_at_other_conditions_are_counted(groups, tmp_path):
+def test_points_without_a_curve_are_counted_with_their_condition(groups, tmp_path):
     table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.01,7,5e-3\n"
     figure = drawn(groups, tmp_path, table)
-    assert "1 of 2 measured points, whose conditions or values are far from those of the curves" in figure.left_out
+    assert "1 of 2 measured points: no curve has their normal_force" in figure.left_out
 
 
-@pytest.mark.parametrize("far", ["1e9,4e-3", "0.01,4e6", "0,4e-3", "-0.01,4e-3"])
-def test_far_points_do_not_squeeze_the_curves(groups, tmp_path, far):
-    figure = drawn(groups, tmp_path, f"velocity [m/s],friction_coefficient\n0.01,2e-3\n{far}\n")
+def test_measured_conditions_scatter_around_the_values_of_the_curves(groups, tmp_path):
+    table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.0997,2e-3\n0.01,1.003,5e-3\n0.01,1.1,5e-3\n"
+    figure = drawn(groups, tmp_path, table)
+    curves = {trace.label: trace.colour for trace in figure.panels[0].traces if trace.what == "data"}
+    points = [trace for trace in figure.panels[0].traces if trace.what == "measured"]
+    assert [trace.colour for trace in points] == list(curves.values())
+    assert "1 of 3 measured points: no curve has their normal_force" in figure.left_out
+    assert any("2 of 3 points differ in normal_force by up to 0.3 %" in text for text in figure.notes)
+
+
+@pytest.mark.parametrize(("row", "is_drawn"), [("1e9,4e-3", 1), ("0.01,4e6", 1), ("0,4e-3", 0), ("-0.01,4e-3", 0)])
+def test_points_are_drawn_wherever_the_axes_can_show_them(groups, tmp_path, row, is_drawn):
+    figure = drawn(groups, tmp_path, f"velocity [m/s],friction_coefficient\n0.01,2e-3\n{row}\n")
     (points,) = (trace for trace in figure.panels[0].traces if trace.what == "measured")
-    assert points.column("y").tolist() == [2e-3]
-    assert any(text.startswith("1 of 2 measured points") for text in figure.left_out)
+    assert points.column("y").size == 1 + is_drawn
+    assert any(text.startswith("1 of 2 measured points") for text in figure.left_out) == (not is_drawn)
+
+
+def test_a_figure_takes_its_output_and_names_what_is_not_used(groups, tmp_path):
+    rows = "1;0,002;0,5;0;9\n2;0,003;0,6;1e-4;9\n"
+    table = f"velocity [mm/s];CoF;indentation depth [um];error of mu;Temp\n{rows}end of test;;;;\n"
+    figure = drawn(groups, tmp_path, table)
+    (points,) = (trace for trace in figure.panels[0].traces if trace.what == "measured")
+    assert points.column("y").tolist() == [2e-3, 3e-3]
+    notes = " ".join(figure.notes)
+    for text in ("'error of mu' taken as one standard error", "Temp", "indentation depth", "end of test"):
+        assert text in notes
 
 
 def test_figures_of_other_quantities_are_refused(groups, tmp_path):
