@@ -120,14 +120,14 @@ def test_columns_of_measured_points_may_have_the_end_of_a_name():
     np.testing.assert_allclose(read.conditions["material_temperature"], [293.15, 313.15])
     np.testing.assert_allclose(read.values, [0.5, 0.6])
     with pytest.raises(DataError, match="unknown column 'density'"):
-        read_measured("density [kg/m^3],mu\n1,2\n3,4\n", "rig.csv", conditions, output)
+        read_measured("density [kg/m^3],mu\n1,2\n3,4\n", "rig.csv", conditions, output, {"oil_density": 5.0})
 
 
 def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("rig.csv").write_text(
         "# of a rig\nvelocity [mm/s], relaxation_times, friction_coefficient, standard_error\n"
-        "1, 0.01, 0.3, 0.01\n10.005, 1, 0.2, 0.01\n1, 100, 0.2, 0.01\n10.000001, 1, 0.2, 0.01\n"
+        "1, 0.01, 0.3, 0.01\n10.5, 1, 0.2, 0.01\n1, 100, 0.2, 0.01\n10.000001, 1, 0.2, 0.01\n"
     )
     Path("rig.yaml").write_text(
         "name: rig\nmodel: velocity_jump\nmeasured: {table: rig.csv}\nparameters:\n"
@@ -139,11 +139,11 @@ def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, 
     for line in (
         "measured rig.csv: 4 rows of friction_coefficient, 0.2 to 0.3, "
         "column 'standard_error' taken as one standard error",
-        "measured rig.csv: conditions velocity 1 mm/s to 10.01 mm/s, relaxation_times 0.01 to 100",
+        "measured rig.csv: conditions velocity 1 mm/s to 10.5 mm/s, relaxation_times 0.01 to 100",
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
     ):
         assert f"  {line}\n" in printed
-    assert "line 4, velocity 10.01 mm/s (study: 1 mm/s to 10 mm/s); line 5, relaxation_times 100 (study: " in printed
+    assert "line 4, velocity 10.5 mm/s (study: 1 mm/s to 10 mm/s); line 5, relaxation_times 100 (study: " in printed
     assert "measured rig.csv: compared with friction_coefficient: coefficient of friction" in printed
 
 

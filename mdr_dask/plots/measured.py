@@ -107,7 +107,7 @@ def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> np.ndarray:
             own = points.isel(point=np.flatnonzero(here))
             panel.traces.append(Trace("curve", own, NAME, name, colour, "", "D", bars=True))
             left &= ~here
-    found = can_be_shown & ~left
+    found: np.ndarray = can_be_shown & ~left
     if found.any():
         label = NAME if measured.errors is None else f"{NAME}, 95 %"
         if len(curves) == 1 and not curves[0].label:
