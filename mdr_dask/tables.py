@@ -626,7 +626,7 @@ def read_table(
             read[column.name], taken[column.name] = values, place
         elif not wrong and not np.allclose(values, read[column.name], rtol=AGREE, atol=0, equal_nan=True):
             both = f"{sheet.names[taken[column.name]]!r} and {sheet.names[place]!r}"
-            what = f"column {column.name} is given twice: {both} disagree: delete one, or write it below the other"
+            what = f"column {column.name} is given twice: {both} disagree: delete one of the two"
             problems.append(sheet.head.problem(place, what))
     lacking = [f"a column {column.name}" for column in absent if column.needed]
     lacking += [", or ".join(" and ".join(each) for each in ways)] if way is None and ways else []

@@ -84,7 +84,7 @@ WRONG = {
     "missing column": ("f [Hz],torque [N]\n1,5\n", "1:1: expected a column storage modulus, got torque"),
     "twice": (
         "f [Hz],omega [Hz],E' [Pa]\n1,2,3\n",
-        "1:8: column frequency is given twice: 'f' and 'omega' disagree: delete one,",
+        "1:8: column frequency is given twice: 'f' and 'omega' disagree: delete one of the two",
     ),
     "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3:1: expected 2 values as in line 1, got 1"),
     "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3:3: $expected a number, got 'high'"),
