@@ -148,7 +148,8 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
     """Return the column that a name means, and the unit, which may be part of the name: mm/s in ``v_mm_s``.
 
     The column is None if the name means none of the `columns`. The exact name of a column comes first, then a synonym,
-    then another name; among columns of equal rank, the unit decides. If it does not decide, ValueError is raised.
+    then another name; among columns of equal rank, the unit decides. If it does not decide, ValueError is raised. A
+    synonym of another name is used if no other column fits.
     """
     exact = [column for column in columns if plain(name) == plain(column.name)]
     synonyms = [column for column in columns if is_called(name, column.name)]
@@ -161,6 +162,11 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             return alike[0], unit
     if found := exact or synonyms or ([] if unit else others):  # the unit is wrong or missing
         return found[0], unit
+    # further words, as in "sliding speed", may mean another quantity, and so may a short name such as "force"
+    quantities = {line[0] for line in SYNONYMS} if " " not in plain(name) else set()
+    short = [each for each in columns if any(is_called(name, other) for other in quantities & set(each.other_names))]
+    if len(agreeing := [column for column in short if _agrees(unit, column)]) == 1:
+        return agreeing[0], unit
     words = re.split(r"[\s_]", name)
     for count in range(len(words) - 1, 0, -1) if not unit else ():
         behind = [JOINED.get(word.casefold(), word) for word in words[count:]]

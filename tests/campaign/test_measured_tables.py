@@ -118,6 +118,13 @@ def test_exact_names_precede_synonyms_and_units_decide_between_quantities(headin
     assert (sorted(found.conditions), found.output) == (conditions, output)
 
 
+@pytest.mark.parametrize("heading", ["temperature", "T", "Temp.", "Temperatur"])
+def test_synonyms_of_a_short_name_are_read(heading):
+    conditions = {"solid_temperature": "K", "velocity": "m/s"}
+    found = read_measured(f"v [m/s];{heading} [°C];mu\n1;20;2\n2;20;3\n", "rig.csv", conditions, FRICTION)
+    assert found.conditions["solid_temperature"].tolist() == [293.15, 293.15]
+
+
 def test_names_of_several_quantities_are_refused():
     with pytest.raises(DataError, match="'Speed', which may be velocity or mean_velocity"):
         read_measured("Speed [m/s];mu\n1;2\n", "rig.csv", {"velocity": "m/s", "mean_velocity": "m/s"}, FRICTION)
