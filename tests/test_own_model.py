@@ -57,6 +57,27 @@ def test_the_example_of_the_page_goes_through_every_command(example, capsys):
     assert "wear_volume_grid_error" in json.loads(capsys.readouterr().out)["rows"][0]
 
 
+def test_the_second_example_of_the_page_has_a_profile_and_a_data_file(example, capsys):
+    module = re.search(r'^```python\n(""\"track.*?)^```', PAGE, flags=re.M | re.S)[1]
+    (example / "track.py").write_text(module)
+    (example / "p.csv").write_text("x,p\n0,0\n0.02,1e6\n")
+    text = "name: track\nmodel: track:MODEL\nparameters: {pressure: p.csv, length: 20 mm, distance: [1 km, 2 km]}\n"
+    (example / "track.yaml").write_text(text)
+    assert main(["init", "track:MODEL"]) == 0
+    assert "distance: 1 km" in capsys.readouterr().out
+    assert main(["run", "track.yaml", "--quiet"]) == 0
+    depth = mdr_dask.open("results/track.zarr").worn_depth.isel(realisation=0)
+    np.testing.assert_allclose(depth.sel(distance=2000, place=[0, 0.02]), [0, 2e-6])
+    assert main(["show", "results/track.zarr", "--columns", "passes"]) == 0
+    assert main(["plot", "results/track.zarr", "worn_depth", "--over", "place", "-o", "track.png"]) == 0
+    assert main(["report", "results/track.zarr", "-o", "track.html"]) == 0
+    assert "in the module track, which is not packed" in Path("track.html").read_text()
+    (example / "p.csv").write_text("x,p\n0,0\n0.02,2e6\n")
+    assert main(["run", "track.yaml", "--quiet"]) == 2
+    assert "pressure" in capsys.readouterr().err
+    del sys.modules["track"]
+
+
 def test_a_changed_function_with_the_same_version_is_noticed(example, caplog):
     assert main(["run", "pin.yaml", "--quiet"]) == 0
     for change, is_noticed in (("    # a comment\n\n    volume =", False), ("    volume = 2 *", True)):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from mdr_dask import aggregation, fits, plots, store
+from mdr_dask import aggregation, fits, models, plots, store
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import curves, labels, page
 from mdr_dask.plots.base import provenance
@@ -145,7 +145,6 @@ def _shows_no_errors(figure: Json) -> bool:
 
 
 def _summary(model: str) -> str:
-    from mdr_dask import models
     from mdr_dask.errors import ModelError
 
     try:
@@ -344,8 +343,11 @@ def _digests(url: str, held: Mapping[str, Any], records: list[Json]) -> dict[str
 def _rerun(url: str, held: Mapping[str, Any]) -> list[str]:
     file = shlex.quote(str(held.get("source") or "campaign.yaml"))
     place = shlex.quote(url)
+    module = str(held["model"]).partition(":")[0]
+    own = f"# with version {held['model_version']} of the model in the module {module}, which is not packed"
     return [
         f"# with mdr_dask {held['versions']['mdr_dask']}",
+        *([own] if models.is_own(str(held["model"])) else []),
         f"mdr-dask run {file} --store {place}",
         f"mdr-dask verify {place}",
         f"mdr-dask report {place} -o report.html",
