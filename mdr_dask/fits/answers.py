@@ -67,9 +67,8 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
     """Return, for each series, the half width that the interval of a constant would have without scatter.
 
-    The half width that remains is due to grid errors and to the misfit of the law. The fit is repeated with slightly
-    less and slightly more scatter, and each of the two half widths is extrapolated linearly to zero scatter. The
-    smaller extrapolated value is used, because a half width jumps if the new scatter alters the verdict on the law.
+    The fit is repeated with slightly less and with slightly more scatter. Each half width is extrapolated linearly to
+    zero scatter, and the smaller result is used.
     """
     now = half_widths(fit, constant, groups)
 
@@ -93,10 +92,10 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return, for each series, whether the interval of a constant is too wide and more realisations are worth while.
+    """Return, for each series, whether the interval of a constant is too wide and more realisations would help.
 
-    More realisations are not worth while if the part of the half width that is due to scatter is within the tolerance,
-    and the total half width would exceed the tolerance even with `at_most` realisations.
+    Realisations do not help if the part of the half width that is due to scatter is within the tolerance, and the total
+    half width would exceed the tolerance even with `at_most` realisations.
     """
     found = half_widths(fit, constant, groups)
     wide = {name: is_wide(*both, tolerance) for name, both in found.items()}
@@ -116,10 +115,9 @@ def cases_behind(
 ) -> xr.DataArray:
     """Return the cases of the series `name` that influence constants whose interval is too wide.
 
-    `wide` marks these constants. The fit gives one constant for each combination of values along the dimensions of
-    `wide`. Each constant is fitted to all cases along the other dimensions of the series. Along each of these other
-    dimensions, neighbouring cases form groups. The results of one group at a time are shifted, and the fit is repeated.
-    A case is chosen if, along each of these dimensions, the shift of its group changes the constant.
+    `wide` marks the constants with such an interval. Along each dimension of the series that `wide` lacks, neighbouring
+    cases form groups. The results of one group are shifted, and the fit is repeated. A case is chosen if, along each
+    such dimension, the shift of its group changes a marked constant.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -154,7 +152,7 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Reduce flags to the dimensions `dims`: a flag is set if any of its flags along the other dimensions is set."""
+    """Return, for each position along the dimensions `dims`, whether any flag at this position is set."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 

@@ -1,8 +1,8 @@
 """The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
 
-Every result has a sentence ``law_holds``. It says whether the law holds with the constants that the publication of the
-law states, and begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, a second sentence
-``fitted_law_holds`` says whether the law holds with the fitted constants.
+Every result has a sentence ``law_holds`` on whether the law holds with the constants that the publication of the law
+states. The sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, a second
+sentence ``fitted_law_holds`` says whether the law holds with the fitted constants.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Fit:
     `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
     realisation, ...), and all scalar parameters as coordinates. `compute` returns constants with the ends of their 95 %
     intervals (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``, with units in
-    the attrs. If `apart`, each series is fitted separately: `compute` takes one series at a time. `constants` contains
-    the names of all constants that have an interval; a campaign may use these names in ``until``. If these names depend
-    on the campaign, `constants` is a function of the campaign.
+    the attrs. If `apart` is true, `compute` takes one series at a time. `constants` contains the names of all constants
+    that have an interval; a campaign may use these names in ``until``. `constants` is a function of the campaign if the
+    names depend on the campaign.
     """
 
     name: str
@@ -70,10 +70,7 @@ class Fit:
 
 
 def require(data: xr.Dataset, *names: str) -> None:
-    """Raise FitError if a study lacks one of the parameters `names`.
-
-    A study of a Kelvin body on a generated line has all of these parameters.
-    """
+    """Raise FitError if a study lacks one of the parameters `names`."""
     missing = [name for name in names if name not in data.variables]
     if missing:
         raise FitError(
@@ -127,8 +124,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p), which are exponents or logarithms of factors; `left` returns data
     minus law. If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by
-    the residuals, which widens the intervals. A constant is NaN if the function `undetermined` marks it, with the
-    derivatives of the law either at the fitted or at the `stated` constants.
+    the residuals, which widens the intervals. A constant is NaN if the function `undetermined` marks it at the fitted
+    or at the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -168,8 +165,8 @@ def verdict(
 ) -> str:
     """Return a sentence on whether a law holds, from a stack of the relative deviations of the data from the law.
 
-    `constants` is the number of constants fitted to these data. `where` describes a case in words. `excluded` means
-    that the interval of a fitted constant does not contain the stated value; the deviations are then not due to
+    `constants` is the number of constants that were fitted to the data. `where` describes a case in words. `excluded`
+    means that the interval of a fitted constant does not contain the stated value; the deviations are then not due to
     scatter.
     """
     if residuals.shape[1] <= constants:
@@ -196,10 +193,10 @@ def law_holds(
 ) -> str:
     """Return a sentence on whether a law holds, from the relative deviations of the data.
 
-    `chance` is the probability that scatter and errors alone cause such deviations. It is NaN if the probability is
-    unknown, and None if scatter and errors cannot cause the deviations. With a probability of 5 %, scatter and errors
-    alone cause an rms deviation above `scatter`. The verdict is at best *approximately* if `scatter` exceeds `WITHIN`,
-    and at best *not tested* if `scatter` exceeds `APPROXIMATE`.
+    `chance` is the probability that scatter and errors alone cause such deviations. `chance` is NaN if this probability
+    is unknown, and None if scatter and errors cannot cause the deviations. With a probability of 5 %, scatter and
+    errors alone cause an rms deviation above `scatter`. The verdict is at best *approximately* if `scatter` exceeds
+    `WITHIN`, and at best *not tested* if `scatter` exceeds `APPROXIMATE`.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

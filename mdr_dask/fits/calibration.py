@@ -39,8 +39,8 @@ class Calibration:
     """The result of a calibration.
 
     `noises` are the possible measurement errors, and `units` the units of unknowns, conditions and output. If the
-    measurement errors in the table do not explain the residuals, `contradicted` contains these residuals. The
-    posterior then uses larger measurement errors, so that the intervals include the misfit.
+    measurement errors in the table do not explain the residuals, `contradicted` contains the residuals, and the
+    posterior uses larger measurement errors, so that the intervals include the misfit.
     """
 
     measured: Measured
@@ -57,7 +57,7 @@ class Calibration:
 
     @cached_property
     def values(self) -> FloatArray:
-        """The unknowns in SI units at the centre of each cell, shape (cells, unknowns)."""
+        """The unknowns in SI units at the centre of each cell of the posterior, shape (cells, unknowns)."""
         return self.prediction.values(self.posterior.places)
 
     @cached_property
@@ -158,7 +158,8 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
     """Return possible measurement errors, which are about as large as the residuals.
 
-    They are equal for all points or, if all measured values are positive, proportional to the predicted values.
+    The first item has equal errors for all points. If all measured values are positive, a second item has errors that
+    are proportional to the predicted values.
     """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
@@ -188,7 +189,8 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the measurement error, from the rms `residual` of the best prediction.
 
-    The true error exceeds the largest size with a probability of 0.1 % (more if the limit of 100 residuals applies).
+    The true error exceeds the largest size with a probability of 0.1 %, or with a larger one if the largest size is
+    limited to 100 times `residual`.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -279,7 +281,6 @@ def summary(found: Calibration) -> xr.Dataset:
 
 
 def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
-    """Return the median and the ends of the 95 % and 68 % intervals of weighted values, indexed by suffix."""
     return dict(
         zip(
             identifiability.ENDS,

@@ -30,8 +30,8 @@ def each(
 ) -> xr.Dataset:
     """Fit a law to the cases along some dimensions, for each combination of values along the other dimensions.
 
-    The function `inner` returns the dimensions along which one fit combines the cases. The fit needs all of `outputs`.
-    The first output must have no dimensions except the axes of the study and ``realisation``.
+    One fit uses all cases along the dimensions that the function `inner` returns. The fit needs all of `outputs`. The
+    first output must have no dimensions except the axes of the study and ``realisation``.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -52,7 +52,7 @@ def each(
 
 
 def dimensions(data: xr.Dataset, *names: str) -> list[str]:
-    """Return the dimensions along which any of these parameters varies."""
+    """Return the dimensions along which any of the parameters `names` varies."""
     return sorted({str(dim) for name in names if name in data.coords for dim in data[name].dims})
 
 
@@ -121,11 +121,8 @@ def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str =
     return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
 
 
-# laws
-
-
 def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a law that is linear in its constants to a stack of logarithms.
+    """Fit a law that is linear in its constants to a stack of logarithms of data.
 
     `design` contains the derivatives of the law with respect to its constants, shape (constants, cases).
     """
@@ -134,7 +131,7 @@ def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
 
 
 def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a straight line to a stack of logarithms against x. The constants are the slope and the value at x = 0."""
+    """Fit a straight line against x to a stack of logarithms; the constants are the slope and the value at x = 0."""
     return linear(np.vstack([x, np.ones(x.size)]), logs, count)
 
 
@@ -192,9 +189,6 @@ def nonlinear(
 def rms(left: FloatArray) -> float:
     """Return the root mean square of the residuals `left`."""
     return float(np.sqrt(np.mean(left**2)))
-
-
-# results
 
 
 def constant(

@@ -27,8 +27,8 @@ def laws_of(
     """Fit laws of the shift factors, and return for each law a sentence on whether the law holds.
 
     If the groups are velocities, the law is a power law. If the groups are temperatures, the laws are Arrhenius' law
-    and the WLF law of log10 a_T. All laws are fitted relative to the middle group, so that the fit
-    does not depend on the reference.
+    and the WLF law of log10 a_T. All laws are fitted relative to the middle group, so that the fit does not depend on
+    the reference.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
@@ -91,8 +91,7 @@ def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     """Add ``law_holds`` to a master curve: whether the curves collapse, and which law the shift factors follow.
 
-    If the curves do not determine all shift factors, nothing is tested. For example, two plateaus of the same height
-    coincide for any shift.
+    The verdict is *not tested* if the curves do not determine all shift factors.
     """
     open_steps = curve.attrs.get("undetermined", "")
     collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
@@ -112,8 +111,7 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
 def _collapse(curve: xr.Dataset) -> str:
     """Return a sentence on whether the curves collapse.
 
-    If there are two ordinates, the sentence is about the ordinate that collapses less well. The scatter of all points
-    about the merged curve is compared with the scatter of each curve about its own polynomial.
+    If there are two ordinates, the sentence is about the ordinate that collapses less well.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
@@ -147,10 +145,7 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 def _scatter(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> tuple[float, float, int]:
-    """Fit a polynomial to each curve; return Schwarz's criterion, the sum of squares and the degrees of freedom.
-
-    The degree with the smallest criterion is used.
-    """
+    """Fit a polynomial to each curve; return Schwarz's criterion, the sum of squares and the degrees of freedom."""
     squares, freedom = 0.0, 0
     for places in members:
         fitted = np.polynomial.Polynomial.fit(x[places], y[places], degree)

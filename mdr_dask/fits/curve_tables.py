@@ -26,7 +26,10 @@ LEAST_JUMP = 3.0
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of numbers below a row of names. If there is a row of units, ``attrs["units"]`` contains them."""
+    """Read a table of numbers below a row of names.
+
+    ``attrs["units"]`` contains the units if the table has a row of units.
+    """
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
@@ -43,7 +46,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
 
 
 def _with_moduli(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with columns of storage and loss modulus, if it has other columns that determine them."""
+    """Add storage and loss modulus to a table with other columns that determine these moduli, such as tan delta."""
     names = {name: column_of(table, name) for way in WAYS for name in way}
     way = next((way for way in WAYS if None not in [names[name] for name in way]), WAYS[0])
     if way == WAYS[0]:
@@ -90,9 +93,11 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column with the wanted name. If there is none, return the first column whose name is a synonym.
+    """Return the column with the wanted name.
 
-    Return None if there is no such column, or if there are several and their values differ.
+    If no column has this name, return the first column whose name is a synonym.
+
+    Return None if no name is a synonym, or if several names are synonyms but the columns contain different quantities.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -171,8 +176,7 @@ def columns_to_use(
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
     """Return which vertical factors suit these columns; columns are recognised by name or unit.
 
-    The kinds ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group. In all
-    other cases, the kind is ``none``.
+    Unless the abscissa is a time or a frequency and the group is a temperature, the kind is ``none``.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:
@@ -189,8 +193,8 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
 def second_group(frame: pd.DataFrame, used: Sequence[str]) -> str | None:
     """Return the column of a further velocity or temperature in which the curves differ; None if there is none.
 
-    Forces and velocities are conditions of friction, but readings of the instrument in a table of moduli against time
-    or frequency.
+    In a table of moduli against time or frequency, forces and velocities are ignored, because they are readings of the
+    instrument.
     """
     found = None
     of_moduli = not any(_is(name, "friction_coefficient") for name in used) and any(
@@ -211,7 +215,7 @@ def second_group(frame: pd.DataFrame, used: Sequence[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the value of `by` of each curve, and log10 of its abscissae and ordinates, shape (ordinates, points)."""
+    """Return the value of `by` of each curve, and log10 of abscissae and of ordinates, shape (ordinates, points)."""
     rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
     if rows.size == 0 or np.any(rows <= 0):
         names = " and ".join(repr(name) for name in (over, *ordinates))
@@ -248,8 +252,8 @@ def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[
     """Divide measured values, which scatter about a few set values, into groups; return each value's group index.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. There is one exception: close values that alternate within one sweep of
-    the abscissa are rounded readings of one set value, and form one group.
+    each distinct value is a group of its own. But close values that alternate within one sweep of the abscissa form one
+    group, because they are rounded readings of one set value.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

@@ -53,9 +53,9 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
-    W, U and G are called groups. An exponent is NaN if its group does not vary, or if its group is proportional to a
-    product of powers of the other two groups. Computed film thicknesses have no scatter; therefore the intervals follow
-    from the misfit. ``law_holds`` is about the formula of Pan and Hamrock.
+    An exponent is NaN if W, U or G does not vary, or if it is proportional to a product of powers of the other two
+    numbers. Computed film thicknesses have no scatter; therefore the intervals follow from the misfit. ``law_holds`` is
+    about the formula of Pan and Hamrock.
     """
     found: Variables = {}
     departures, of_stated = [], []
@@ -84,7 +84,6 @@ def _film_exponents(series: Series) -> xr.Dataset:
 
 
 def _axes_of_groups(data: xr.Dataset) -> list[str]:
-    """Return the dimensions along which W, U or G varies."""
     return [str(dim) for group in groups_of(data.coords.get) for dim in getattr(group, "dims", ())]
 
 

@@ -94,9 +94,8 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
 
-    At this velocity and at the next one, the values of mu / v differ by less than the fraction `WITHIN`.
-    The index is not always 0: with the time stepping of the original papers, friction does not fall below a spurious
-    limit and is therefore too large at very low velocities.
+    At this velocity and at the next one, the values of mu / v differ by less than the fraction `WITHIN`. The index need
+    not be 0: the time stepping of the original papers makes friction at very low velocities too large.
     """
     if velocity.size == 1:
         return 0
@@ -198,7 +197,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return dimensionless velocities, or v tau in m if the study has no rms height; also a format string for them."""
+    """Return dimensionless velocities, or v tau in m if the study has no rms height; also return a format string."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"

@@ -103,7 +103,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return the product of powers; its exponents are rounded to simple fractions if `ROUNDED` allows it."""
+    """Return the product of powers; exponents are rounded to simple fractions (see `ROUNDED`) or to two decimals."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator

@@ -85,7 +85,7 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
     """
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
-    for axis in axes * 2:  # twice: values interpolated along a later axis allow more along an earlier one
+    for axis in axes * 2:  # twice: values interpolated along one axis may allow interpolation along a previous axis
         places = mean[mean.dims[axis]].to_numpy()
         lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
         for case in np.ndindex(lines.shape[:-1]):

@@ -1,4 +1,4 @@
-"""Interpolation on linear or logarithmic scales: monotone cubics, straight lines, and the errors of both."""
+"""Interpolation on linear or logarithmic scales: monotone cubics, straight lines, and the errors of interpolation."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Scale:
 
 
 def dense(axes: Sequence[FloatArray], size: int) -> list[FloatArray]:
-    """Divide each interval between neighbouring values of all axes into equal steps; return the given and new values.
+    """Divide each interval between neighbouring values of an axis into equal steps; return given and new values.
 
     The steps are equal on the scale that `Scale.of` chooses for an axis. `size` is the number of values in the table of
     computed values.
@@ -92,7 +92,7 @@ def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: in
     """Estimate the error of interpolation at every value of an axis (`places`) by leaving out every second value.
 
     `table` contains numbers converted to `scale`; the result is the error of the numbers before this conversion. Each
-    error is the largest of three estimates: the one at the value itself and those at its two neighbours.
+    error is the largest of three estimates: at the value itself and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)

@@ -141,7 +141,7 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 def _jump_law(data: xr.Dataset) -> Variables:
     """Fit the constant c of eq. 4.11 to all cases in which friction does not fall with the velocity.
 
-    Also test eq. 4.9 in region I, and eq. 4.10 on the plateau of friction.
+    The function also tests eq. 4.9 in region I, and eq. 4.10 on the plateau of friction.
     """
     jumps = jumps_of(data)
     numbers = jumps.numbers()
@@ -173,7 +173,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # `fitted` may repeat the fit for another number of rows of shifted data; these rows use mu_1 of the first row
+        # if `fitted` repeats the fit for shifted data, mu_1 of the first row is used for all rows
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -191,7 +191,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 def _limit(
     name: str, verdict_name: str, stated: float, stack: FloatArray, count: int, meaning: str, question: str
 ) -> Variables:
-    """Return the mean of a quantity over the cases of its `stack`, and whether it equals the `stated` value."""
+    """Return the mean over the cases of a `stack`, and a sentence on whether this mean equals the `stated` value."""
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
         return nothing | measure(verdict_name, "not tested: no case in this region", question)

@@ -79,7 +79,7 @@ def master_curve(
 
 
 def _largest_offset(found: Superposition, rise: FloatArray) -> str:
-    """Return a text with the group whose ordinates deviate most from their median, without the known `rise`."""
+    """Return a text with the largest vertical offset of a group, apart from the known `rise` and the median offset."""
     offset = rise - found.vertical
     offset -= np.median(offset)
     worst = int(np.argmax(np.abs(offset)))
@@ -195,7 +195,7 @@ def _dataset(
     }
     attrs |= {f"{name}_noise": float(each) for name, each in zip(("ordinate", "companion"), result.noise, strict=False)}
     found: dict[str, tuple[Any, ...]] = {}
-    narrow, wide = result.interval(math.erf(0.5**0.5)), result.interval()  # as wide as two standard errors; 95 %
+    narrow, wide = result.interval(math.erf(0.5**0.5)), result.interval()  # 68 % and 95 %
     for name, factor, own in (
         ("shift_factor", result.horizontal, slice(size)),
         ("vertical_factor", result.vertical, slice(size, None)),

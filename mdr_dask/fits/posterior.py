@@ -31,9 +31,10 @@ DEVIATIONS = 14
 
 
 class Noise(NamedTuple):
-    """Standard deviations of the measurement errors: `pattern`, one value for each point, times one of the `sizes`.
+    """Possible standard deviations of the measurement errors.
 
-    If `pattern` is None, the absolute predicted values replace it.
+    The standard deviations are `pattern`, with one value for each point, times one of the `sizes`. If `pattern` is
+    None, the absolute predicted values replace `pattern`.
     """
 
     sizes: FloatArray
@@ -50,7 +51,7 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
     """Return a function that takes points in the unit cube and returns logarithms of the likelihood of measured values.
 
     The points have the shape (sets, unknowns), the logarithms the shape (sets, number of sizes of all noises). All
-    items of `noises` have the same prior probability. All sizes of one item have the same prior probability, too.
+    items of `noises` have the same prior probability, and so have all sizes of one item.
     """
 
     def of(places: FloatArray) -> FloatArray:
@@ -126,7 +127,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
     """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
 
-    If there are more than `most` such cells, `most` of them are selected at random.
+    If this would be more than `most` cells, `most` cells of high density are selected at random.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

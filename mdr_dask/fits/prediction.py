@@ -209,10 +209,7 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 
 
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the part of the standard error that is independent for each case, and the modes of the common part.
-
-    A factor from Student's t distribution enlarges both parts if there are few realisations.
-    """
+    """Return the part of the standard error that is independent for each case, and the modes of the common part."""
     count = deviations.shape[-1]
     if count < 2:
         return np.zeros_like(mean), np.zeros((*mean.shape, 0))

@@ -49,16 +49,11 @@ FIELDS = {
 }
 
 
-# one exponential
-
-
 class Relaxation(NamedTuple):
     """One exponential fitted to a trace, which is the mean of mu - mu_2 over realisations as a function of time.
 
     `rate` is the stack of the fitted rate, and `integral_rate` the stack of the rate that follows from the integral of
-    the trace. If scatter and errors do not explain the deviations of the trace from the exponential, rows are added to
-    `rate`, which widen its interval: the integral rate, and rates fitted to the trace shifted by the deviations.
-    `holds` is the verdict on the deviations, divided by the largest value of the trace.
+    the trace. `holds` is the verdict on the exponential.
     """
 
     rate: FloatArray
@@ -126,9 +121,6 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     return Relaxation(rate, integral, holds)
 
 
-# comparison of the relaxation of one case with the laws of the thesis
-
-
 def law_rate(number: float, hurst: float) -> float:
     """Return the rate by eq. 4.12 from the number v_1 tau q_max and the Hurst exponent."""
     return number if number < 1 else number ** (1 - hurst)
@@ -143,7 +135,7 @@ def _passing_number(case: xr.Dataset) -> float:
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the times t', the values, shape (realisations, values), and the grid errors of the mean values.
 
-    The first time is 0. The values are mu_1, d_mu_0, mu_2, and mu at all times except the first.
+    The values are mu_1, d_mu_0 and mu_2, followed by mu at all times except the first time, which is 0.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -152,11 +144,7 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
-    """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
-
-    The stored grid error of mu already includes the grid error of mu_2. Therefore, the grid error of mu - mu_2 is the
-    difference between these two grid errors.
-    """
+    """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax."""
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
     relaxing = np.column_stack([before + jump - after, values[:, 3:] - after[:, None]])
@@ -219,9 +207,6 @@ def _relaxation(case: xr.Dataset) -> Variables:
             "fitted_law_holds", found.holds if found else "not tested: nothing relaxes", "whether one exponential fits"
         ),
     }
-
-
-# the power of the rate
 
 
 def _rate_power(data: xr.Dataset) -> Variables:

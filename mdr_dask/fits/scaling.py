@@ -71,10 +71,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return two ratios: slope in contact divided by slope of the line, and computed mu divided by mu of eq. 3.12.
-
-    The result is empty if the store lacks one of the required outputs.
-    """
+    """Return two ratios: slope in contact divided by slope of the line, and computed mu divided by mu of eq. 3.12."""
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -228,7 +225,7 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the matrix, shape (places, knots), that maps heights at the knots to a natural cubic spline at `place`.
+    """Return the matrix, shape (places, knots), that maps values at the knots to values of the natural cubic spline.
 
     Outside the range of the knots, the spline continues as a straight line.
     """
@@ -243,7 +240,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 def _collapse(data: xr.Dataset) -> Variables:
     """Shift the curves of friction against velocity onto one common curve.
 
-    There is one curve for each load. Each curve ends at its largest friction.
+    Each load has one curve, which ends at the largest friction.
     """
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns

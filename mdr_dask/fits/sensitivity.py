@@ -1,7 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Its variance is computed from products of different realisations, because
-products within one realisation contain the variance of the scatter.
+The output is the mean over realisations. The variance of the output is computed from products of different
+realisations, because products within one realisation contain the variance of the scatter.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 def _is_saltelli(columns: FloatArray) -> bool:
     """Return whether the cases are those of Saltelli's design.
 
-    Each group of cases then consists of a point a, a point b and, for each input, a copy of point a in which this input
-    has the value from point b.
+    In Saltelli's design, each group of cases consists of a point a, a point b and, for each input, a copy of point a in
+    which this input has the value from point b.
     """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
@@ -113,10 +113,7 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the product of `left` and `right`, averaged over all pairs of different realisations.
-
-    A single realisation is paired with itself.
-    """
+    """Return for each point the product of `left` and `right`, averaged over all pairs of different realisations."""
     count = len(left)
     if count == 1:
         return np.asarray(left[0] * right[0])
@@ -141,10 +138,9 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
 
-    The index is the mean of two estimates; its interval extends from the lower end of the first interval to the upper
-    end of the second. The first estimate uses products of different points only; it is right for random points. The
-    second estimate also uses the product of each point with itself. It is right for points that fill space evenly, such
-    as a Sobol sequence, because neighbours then differ systematically in their other inputs.
+    The first-order index is the mean of two estimates: one for random points, and one for points that fill space
+    evenly, such as a Sobol sequence. The interval extends from the lower end of the first interval to the upper end of
+    the second.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -152,7 +148,7 @@ def _of_neighbours(values: FloatArray) -> FloatArray:
 
 
 def _neighbours(values: FloatArray) -> FloatArray:
-    """Return the two estimates of `_of_neighbours` from outputs that are sorted by the input."""
+    """Return the estimates of `_of_neighbours`; only the second one uses the product of each point with itself."""
     most = max(1, int(np.sqrt(values.shape[1]) / 2))
     own, square = _product(values, values).mean(), values.mean() ** 2
     near = np.mean([_product(values[:, k:], values[:, :-k]).mean() for k in range(1, most + 1)])

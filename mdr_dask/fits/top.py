@@ -10,7 +10,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most a fraction: the first of these fractions
+#: A parabola is fitted to the points that are below the maximum by at most one of these fractions: the first fraction
 #: for which scatter and errors explain the residuals.
 TOPS = (0.3, 0.2, 0.1, 0.05)
 
@@ -24,7 +24,7 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """Stacks that describe the maximum of a parabola that is fitted to the points near the largest friction.
+    """The maximum of a parabola fitted to the points near the largest friction; every field is a stack.
 
     `height` is the maximum, corrected for its bias; its interval includes the residuals of the parabola. `place` is
     ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum; it is 0 unless the maximum is
@@ -59,10 +59,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the range of points that are below the maximum by at most the fraction `drop` of the maximum.
-
-    The range contains at least three points.
-    """
+    """Return the range of points, at least three, that are below the maximum by at most the fraction `drop`."""
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
