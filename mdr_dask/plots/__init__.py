@@ -24,9 +24,7 @@ GROUP = "mdr_dask.plots"
 
 
 def available(model: str) -> dict[str, Plot]:
-    """Return all figures for stores of a model, indexed by name. Figures from other packages (see `GROUP`) are
-    included.
-    """
+    """Return the figures for stores of a model, indexed by name, including those from other packages (see `GROUP`)."""
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}

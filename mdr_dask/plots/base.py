@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure that has a name. Its function `draw` receives the groups of a store, indexed by the name of the series.
+    """A figure that has a name. The function `draw` receives the groups of a store, indexed by the name of the series.
 
-    `models` are the names of the models that have this figure; all models have it if there are no names. `summary`
+    `models` are the names of the models that have this figure; if `models` is empty, all models have it. `summary`
     names the quantities on both axes. `fitted` is true if the figure shows a fit; such a figure takes a long time in a
     large study.
     """
@@ -76,13 +76,13 @@ def _without_value(states: Sequence[xr.DataArray]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the program version, the command and the campaigns of a figure that a command drew, for its table."""
+    """Return the origin of a figure that a command drew: the program version, the command and the campaigns."""
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 
 
 def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the program version and the campaigns of a figure that was drawn from Python, for its table."""
+    """Return the origin of a figure that was drawn from Python: the program version and the campaigns."""
     campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
     return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 

@@ -70,7 +70,7 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
     """Divide the measured points into curves: the points of a curve differ only in the condition `main`.
 
-    The curves are indexed by their labels. If there are more curves than colours, all points form one curve.
+    If there are more curves than colours, all points form one curve.
     """
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))

@@ -30,9 +30,9 @@ class Family(NamedTuple):
     """Curves against one parameter, with the entries of their legend.
 
     `bar` is a colour bar if the curves have more values than there are colours, otherwise None. `held` are the
-    parameters that have one value in all curves. `left_out` are texts about the values that are not drawn. In a sampled
-    study, several parameters change from point to point; `varying` are the parameters among
-    these that neither the axis nor the colours show.
+    parameters that have one value in all curves. `left_out` are texts about the values that are not drawn. `varying`
+    are the parameters that change from point to point in a sampled study, but that neither the axis nor the colours
+    show.
     """
 
     curves: list[Curve]
@@ -118,11 +118,10 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
     """Split a series into curves against the parameter `along`.
 
     The curves differ in the parameter `by`. Without `by`, there is a curve for every combination of values of the other
-    axes. If these are more curves than colours, colours show the values of one axis, and line styles show those of a
-    second axis if it has few values. All axes that are not shown are fixed at their middle value. If the axis shown by
-    colours has more values than there are colours, a colour bar shows the values if they are numbers; if they are
-    words, some of them are left out. The label of each curve begins with the name `series`. The first curve gets the
-    colour with the number `first`.
+    axes. If there would be more curves than colours, colours show the values of one axis, and line styles show the
+    values of a second axis if it has few values. All axes that are not shown are fixed at their middle value. If the
+    axis shown by colours has more values than there are colours, numbers have a colour bar, and some words are left
+    out. The label of each curve begins with the name `series`. The first curve gets the colour with the number `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
@@ -165,7 +164,7 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
     """Choose the axis shown by colours, and possibly a second axis shown by line styles.
 
-    The choice is the one with the largest number of curves.
+    The choice shows as many curves as possible.
     """
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
@@ -226,9 +225,7 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return one label for each of the dimensions `dims`: the values of the parameters along this dimension, in this
-    part of the series.
-    """
+    """Return one label for each of the dimensions `dims`, with the values of its parameters in a part of the series."""
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -247,7 +244,6 @@ def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
 
 
 def _given(data: xr.Dataset, name: str) -> list[Any]:
-    """Return all values that a parameter has in a series."""
     return list(np.ravel(data[name].values)) if name in data.coords else [parameters_of(data).get(name)]
 
 
@@ -264,7 +260,8 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     """Return a text with the fixed parameters, for a title.
 
-    It begins with the parameters that are axes of the study. Of the others, it contains those that have a symbol.
+    The text begins with the parameters that are axes of the study. Other parameters are left out if they have no
+    symbol.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]

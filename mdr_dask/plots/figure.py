@@ -108,7 +108,7 @@ class Trace:
 
 @dataclass
 class Panel:
-    """One panel. If it has neither `keys` nor a colour bar, every trace with a label is an entry of the legend."""
+    """A panel; without `keys` and without a colour bar, every trace with a label is an entry of the legend."""
 
     x: Axis
     y: Axis

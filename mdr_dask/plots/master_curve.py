@@ -38,7 +38,6 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
 
 
 def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
-    """Return a master curve whose values are in the units of the figure."""
     by, second = str(curve.attrs["group"]), str(curve.attrs.get("second", ""))
     named = {"curve_abscissa": curve.attrs["abscissa"], "point_abscissa": curve.attrs["abscissa"]}
     named |= {
