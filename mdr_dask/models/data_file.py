@@ -92,7 +92,7 @@ NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_ty
 class NamedByFile(Parameters):
     """A parameter set with a field `file` or `files`.
 
-    In place of the whole parameter set, a user may write only the name of the file. The other fields then have their
+    In place of the whole parameter set, a user may write only the name of the file; all other fields then have their
     default values.
     """
 

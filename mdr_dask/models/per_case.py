@@ -140,7 +140,7 @@ def _is_real(item: Any) -> bool:
 def _gathered(
     name: str, found: Mapping[tuple[int, int], Mapping[str, NDArray[np.float64]]], shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return one output for all cases. The output of a failed case is NaN."""
+    """Return one output for all cases, with NaN for failed cases."""
     arrays = {place: outputs[name] for place, outputs in found.items()}
     extra = {array.shape for array in arrays.values()} or {()}
     if len(extra) > 1:

@@ -186,8 +186,8 @@ OUTPUTS = (
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     """Return the dimensionless parameters W (load), U (speed) and G (material).
 
-    Numbers that the user does not give are computed. ``lookup(name)`` returns the values of the parameter `name`, or
-    None if the user does not give it.
+    W, U and G are computed if the user does not give them. ``lookup(name)`` returns the values of the parameter `name`,
+    or None if the user does not give it.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")

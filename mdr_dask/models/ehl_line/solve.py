@@ -48,7 +48,6 @@ def _groups(block: Block[EhlLineParameters]) -> Groups:
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
-    """Return the dimensionless problem of every case. Cases whose dimensionless problems are equal share a solution."""
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
     return [

@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `mixed_lubrication`. This module does not import the solver."""
+"""Parameters and outputs of the model `mixed_lubrication`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 from mdr_dask.units import shown_apart
 
 Positive = Annotated[float, Field(gt=0)]
-WAVES = 100_000  # default circumference of a roller over the shortest wavelength
+WAVES = 100_000  # default ratio of the circumference of a roller to the shortest wavelength
 #: Positions at which the profiles are stored, divided by the half width of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
@@ -175,7 +175,7 @@ class MixedLubrication(Parameters):
         return self.roller_radius / 2
 
     def source(self) -> Source:
-        """Return the object that makes the rough lines. Cases for which these objects are equal share their lines."""
+        """Return the object that makes the rough lines. Cases whose objects are equal have the same lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)

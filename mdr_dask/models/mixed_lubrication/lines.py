@@ -1,4 +1,4 @@
-"""The two rough lines of a case. They are self-affine, have the spectra of measured surfaces, or are measured."""
+"""The two rough lines of a case: self-affine, with the spectra of measured surfaces, or measured."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
 from mdr_dask.units import shown
 
-MOST_POINTS = 10**7  # of a line: capacity of the memory
-LEAST_PER_WAVE = 2.5  # points per shortest wavelength on the coarsest of the grids for `points: auto`; 2 is the least
+MOST_POINTS = 10**7  # largest number of points of a line, limited by memory
+LEAST_PER_WAVE = 2.5  # points per shortest wavelength on the coarsest grid for `points: auto`; 2 is the minimum
 DOUBLINGS = 3  # largest number of finer grids for `points: auto`
 
 
@@ -170,8 +170,8 @@ class Measured:
         """Return the interpolating splines of both lines, shape (2, points), through all points or every second point.
 
         During one revolution at the mean velocity, with a slide-roll ratio S, the contact travels (1 + S/2) times the
-        length of line 1, and (1 - S/2) times the length of line 2. It thus passes some points more often than others.
-        Both lines begin at random points, so that means over realisations are nevertheless unbiased.
+        length of line 1, and (1 - S/2) times the length of line 2. The contact thus passes some points more often than
+        others. Because both lines begin at random points, means over realisations are nevertheless unbiased.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
@@ -181,7 +181,7 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines of equal length, scaled to the rms height 1 if this is wanted."""
+        """Return the lines of equal length, scaled to the rms height 1 if `scaled` is true."""
         first, second = (line / line.std() if self.scaled else line for line in self._levelled())
         return first, second
 
@@ -201,7 +201,7 @@ def _are_equal(one: float, two: float) -> bool:
 
 @lru_cache(maxsize=16)
 def _heights_at(file: ProfileFile, spacing: float) -> FloatArray:
-    """Return the heights of a measured line at points with this spacing, by a cubic spline if it is not its own."""
+    """Return the heights of a measured line, interpolated by a cubic spline if the line has another spacing."""
     from scipy.interpolate import CubicSpline
 
     line = line_of(file)

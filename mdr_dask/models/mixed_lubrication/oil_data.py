@@ -81,7 +81,7 @@ class OilData(Parameters):
     def two_viscosities(self) -> tuple[float, float, float, float]:
         """Two temperatures in K, each followed by the kinematic viscosity in m^2/s at this temperature.
 
-        The user gives them, or they are computed by the law that is fitted to the table.
+        The user gives these viscosities, or they follow from the law that is fitted to the table.
         """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)

@@ -138,7 +138,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function and a warning. The function computes the film from the load share of the film.
+    """Return a function that computes the film from the load share of the film, and a warning.
 
     The warning is empty unless the case is outside the range of the film formula.
     """

@@ -15,8 +15,8 @@ from mdr_dask.physics.lubrication import breakthrough, film_formulas
 from mdr_dask.physics.lubrication.clusters import find_clusters
 from mdr_dask.physics.surfaces.splines import heights
 
-PARTS = 16  # most parts of a revolution; the scatter between them gives the standard error
-WINDOWS = 4  # with sliding: windows on the coarsest grid in the width of one window
+PARTS = 16  # largest number of parts of a revolution; the scatter between the parts gives the standard error
+WINDOWS = 4  # with sliding: width of a window over the distance of neighbouring windows on the coarsest grid
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Revolution:
 
     A window is the part of both lines that is in the Hertzian contact at one instant. The windows are equidistant in
     time. `contact` times `unit` is the length in m that is in intimate contact in each window. `parts` is the number of
-    equal parts into which the revolution is divided. The scatter between these parts gives the standard error.
+    equal parts into which the revolution is divided.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -70,7 +70,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
     """Return the length in intimate contact, as in `Revolution.contact`, after each travelled distance in `travels`.
 
-    These distances are divided by the spacing of the points.
+    The distances in `travels` are divided by the spacing of the points.
     """
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)

@@ -76,7 +76,6 @@ def compute(block: Block[MixedLubrication]) -> Result:
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
-    """Copy the requested values from `found` to the result."""
     for name in found.keys() & set(block.outputs):
         result.values[name][index, position] = found[name]
 
@@ -107,7 +106,7 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute one realisation of all cases that share lines. The accuracy determines how many points each case gets."""
+    """Compute one realisation of all cases that share lines."""
     lines = lru_cache(maxsize=1)(partial(source.lines, block.seed, block.realisations[position]))
     found: list[Revolution] = [None] * len(members)  # type: ignore[list-item]
     arrays: list[dict[str, FloatArray]] = [{}] * len(members)

@@ -1,4 +1,4 @@
-"""Find the cases whose estimated errors exceed the accuracy that a campaign requires. All models use this module."""
+"""Find the cases whose estimated errors exceed the accuracy that a campaign requires."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return a message for every case in which an output misses the accuracy. The key is the index of the case.
+    """Return a message for every case in which an output misses the accuracy, indexed by the number of the case.
 
-    An output misses the accuracy if its relative error exceeds `accuracy`. The relative error is the largest absolute
-    error of the output, divided by its largest absolute value or by its floor, whichever is larger. `values` and
-    `errors` have the shape (cases, ...); elements that are NaN in `values` or in `errors` are ignored. A floor has the
-    unit of its output. `where` is added to the messages, such as ``" on the finest grid"``.
+    The relative error is the largest absolute error of the output, divided by its largest absolute value or by its
+    floor, whichever is larger. `values` and `errors` have the shape (cases, ...); elements that are NaN in `values` or
+    in `errors` are ignored. A floor has the unit of its output. `where` is added to the messages, such as ``" on the
+    finest grid"``.
     """
     shares = {
         name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()

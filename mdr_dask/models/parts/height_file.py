@@ -136,9 +136,9 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     """Return the unit of the heights in m, such as 1e-6, and the spacings along x and y in m.
 
     Unit and spacings are taken from the file or from the options of the user. If only the unit of the positions is
-    missing, it is found from the spacing that the user states: for positions 0, 0.5, 1 ... and a spacing of 0.5 um, the
-    unit is 1e-6 m. A unit that is found in this way is a power of ten of a metre. Positions 0, 1, 2 ... without a unit
-    are numbers of pixels if the user states the spacing.
+    missing, it is the power of ten of a metre that gives the spacing that the user states: for positions 0, 0.5, 1 ...
+    and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... without a unit are numbers of pixels if the user
+    states the spacing.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -183,7 +183,6 @@ def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
 
 
 def _metre(file: DataFile, unit: str, option: str) -> float:
-    """Return the length of a unit in metres."""
     try:
         return to_si(f"1 {unit}", "m")
     except ValueError as error:
@@ -242,7 +241,6 @@ def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
 
 
 def _array(file: DataFile) -> FloatArray:
-    """Return the two-dimensional array in an npy file."""
     try:
         array: Any = np.load(io.BytesIO(file.read_bytes()), allow_pickle=False)
     except (ValueError, EOFError, OSError) as problem:
@@ -443,7 +441,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     """Return the positions and the heights of a line scan, both in m, from a table.
 
     If the columns have no names, the positions are the column whose numbers only rise or only fall. A single column of
-    numbers contains the heights, even below text that does not name them; the user must then give the spacing.
+    numbers contains the heights, whatever text is above it; the user must then give the spacing.
     """
     text = file.read_text()
     sheet = read_sheet(text, file.name)

@@ -158,10 +158,7 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return b_T at the material's temperature. The moduli of a table are divided by this factor.
-
-    Return 1 if the moduli do not come from a table.
-    """
+    """Return b_T at the material's temperature. The moduli of a table are divided by this factor."""
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
         return 1.0
@@ -217,7 +214,7 @@ def fit_error(material: Material | None) -> float:
 def frequencies(material: Material) -> tuple[float, float] | None:
     """Return the lowest and highest angular frequency, in rad/s, of the data of a power law or a table.
 
-    Both frequencies are shifted to the material's temperature. Return None for other materials.
+    The frequencies are shifted to the material's temperature. Return None for other materials.
     """
     fit = _fit_of(material)
     if fit is None:

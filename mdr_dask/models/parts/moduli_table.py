@@ -232,7 +232,7 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
 
 
 def _require_overlap(moduli: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Raise DataError if some curves overlap with the others in neither of the two `moduli`, shape (2, rows).
+    """Raise DataError if a gap in both `moduli`, shape (2, rows), separates some curves from all other curves.
 
     No horizontal shift can close such a gap.
     """
@@ -265,7 +265,7 @@ def moduli_of(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray
 
 
 def _table(chosen: ModulusTable) -> Read:
-    """Return the columns of the file. If it has complex moduli or tan delta, storage and loss modulus are computed."""
+    """Return the columns of the file, including storage and loss modulus."""
     name, content = chosen.file.name, chosen.file.read_text()
 
     def modulus(kind: str, *other_names: str) -> Column:
@@ -302,11 +302,7 @@ def _table(chosen: ModulusTable) -> Read:
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage modulus, loss modulus and temperature of each row, in SI units.
-
-    The temperature is None if the file has no such column. Raise DataError for moduli in tension without a Poisson
-    ratio, and for shear moduli with a Poisson ratio.
-    """
+    """Return angular frequency, storage modulus, loss modulus and temperature of each row, in SI units."""
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = (table[column] for column in ("frequency", "storage modulus", "loss modulus"))
     temperature, wanted = table.get("temperature"), chosen.table_temperature

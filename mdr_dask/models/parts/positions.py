@@ -74,7 +74,7 @@ def is_numbered(line: FloatArray) -> bool:
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
     """Return the step of the positions in all given rows (or columns); raise DataError if two of their steps differ.
 
-    Rows of consecutive integers are row numbers and have no step. Return None if all given rows are row numbers.
+    Rows of consecutive integers are row numbers and have no step.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):

@@ -39,7 +39,6 @@ class Generated:
 
 
 def _with_random_phases(amplitude: FloatArray, points: int, seed: int, realisation: int) -> Waves:
-    """Return one realisation of a line with the given amplitudes and random phases."""
     from mdr_dask.physics.surfaces import roughness
     from mdr_dask.physics.surfaces.waves import Waves
 
@@ -133,7 +132,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A line without roughness. Solvers choose the same grids as for a rough line with this number of points."""
+    """A line without roughness; solvers choose the same grids as for a rough line with `points` points."""
 
     points: int
     is_random = False

@@ -51,7 +51,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers. Cases with equal numbers have the same dimensionless solution.
+    """The cases of a block as dimensionless numbers.
 
     `which` holds, for every case, its index into `settings`, or -1 if the case cannot be solved. `loads` are F_N / (4
     G_inf L h) with the static shear modulus G_inf. `deborah` are the Deborah numbers eta v / (G_inf L) with the
@@ -84,7 +84,7 @@ class SlidingProblems:
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
         """Find the different pairs of Deborah number and load among the cases `members`.
 
-        Return the Deborah numbers and the loads of these pairs, and for every case the index of its pair.
+        Return the Deborah numbers and the loads of the different pairs, and for every case the index of its pair.
         """
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
@@ -93,8 +93,7 @@ class SlidingProblems:
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
     """Find the different rows of a table whose columns are given. Objects are compared by identity.
 
-    For each combination of values, return the index of the first row with this combination. Also return, for every row,
-    the index of its combination.
+    Return the index of the first row with each combination of values, and for every row the index of its combination.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -185,7 +184,7 @@ def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
 def _lines(
     block: Block[Any], faults: dict[int, str]
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
-    """Return the different lines. Also return, for every case, the index of its line, the length L and the height h."""
+    """Return the different lines and, for every case, the index of its line, the length L and the height h."""
     length, height = block.numbers("length"), block.numbers("rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
@@ -222,7 +221,7 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
     """Return the static modulus in Pa and the ratio of viscosity to static modulus in s, both for every case.
 
     Also return the Prony terms of each different solid, and for every case the index of its solid. Prony terms are
-    moduli divided by the static modulus, with relaxation times in s. They are None for a Kelvin solid.
+    moduli divided by the static modulus, with relaxation times in s. The Prony terms of a Kelvin solid are None.
     """
     static, viscosity = block.numbers("shear_modulus"), block.numbers("relaxation_time")
     materials, which = each(block, "material")

@@ -145,7 +145,6 @@ def is_spectrum(text: str) -> bool:
 
 @lru_cache(maxsize=64)
 def _tabulated(file: DataFile) -> Found:
-    """Return the spectrum of a table."""
     from mdr_dask.physics.surfaces.scans import averaged, of_cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 

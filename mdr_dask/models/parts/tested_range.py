@@ -34,7 +34,7 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
         try:
             modulus = one.shear_modulus if one.material is None else solid_of(one.material).static_modulus
             height, force = OfSurface(one.surface, one.points, one.length).height(), one.largest_force()
-        except (DataError, ValueError):  # the solver reports this problem for each of these cases
+        except (DataError, ValueError):  # the solver reports the problem for each case
             continue
         loads.append(force / (4 * (modulus or np.inf) * one.length * height))
     largest = max(loads, default=0.0)
@@ -47,11 +47,11 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
-    """Return a message for every case outside the tested range. The key is the index of the case.
+    """Return a message for every case outside the tested range, indexed by the number of the case.
 
     `loads` are F_N / (4 G_inf L h), and `fractions` are the fractions of the line in contact. For a loading history,
-    both are the largest values during the history. Only plane bodies with the spectrum of a measured surface are
-    checked; other bodies give no messages.
+    loads and fractions are the largest values during the history. Only plane bodies with the spectrum of a measured
+    surface are checked; other bodies give no messages.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `sliding_friction`. This module does not import the solver."""
+"""Parameters and outputs of the model `sliding_friction`."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield, for each group of cases with equal setting and grid: the setting, one case, the indices of all cases."""
+    """Yield the setting, one case and the indices of all cases, for each group of cases with equal setting and grid."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members

@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `velocity_jump`. This module does not import the solver."""
+"""Parameters and outputs of the model `velocity_jump`."""
 
 from __future__ import annotations
 

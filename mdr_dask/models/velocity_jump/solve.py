@@ -1,7 +1,7 @@
 """Solve a block of cases: friction after a jump of the velocity, or under a loading history.
 
-Jumps of a plane Kelvin body are solved by marching the indentation depth in time. In all other cases, the motion of
-every element of the viscoelastic foundation is computed.
+Jumps of a plane Kelvin body are solved by marching the indentation depth in time. All other jumps and histories are
+solved from the motion of every element of the viscoelastic foundation.
 """
 
 from __future__ import annotations
@@ -90,9 +90,9 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
-    """Yield groups of cases. Jumps of a plane Kelvin body form a group if they have the same line and grid.
+    """Yield groups of cases.
 
-    Every other case is a group by itself.
+    A group consists of jumps of plane Kelvin bodies with the same line and grid, or of a single other case.
     """
     protocols, which = each(block, "protocol")
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
@@ -178,7 +178,8 @@ class _Group:
         """Return the floor of an output for every case (see `missed_accuracy`).
 
         The floor of a depth is the rms height, which is the unit of the depths here. If friction is zero within its
-        error, as for a body at rest, the floor is the largest absolute friction of the case. Otherwise it is 0.
+        error, as for a body at rest, the floor is the largest absolute friction of the case. The floor of any other
+        friction is 0.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -192,10 +193,9 @@ class _Group:
 
 
 class _Marched(_Group):
-    """Jumps of a plane Kelvin body on one line. Equal jumps are solved only once."""
+    """Jumps of a plane Kelvin body on one line."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the different cases together."""
         loads, deborah, which = self.different
         is_wanted = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
@@ -216,21 +216,16 @@ class _Marched(_Group):
 
     @property
     def operations(self) -> float:
-        """Operations of all different cases."""
         nodes = self.setting.roughness.points * self.oversampling
         return self.different[0].size * nodes * self.steps * OPERATIONS_MARCHED
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Loads and Deborah numbers of the different cases, and the index of every case among the different cases.
-
-        The different cases are sorted by Deborah number, because the solver shares work between neighbours with equal
-        Deborah numbers.
-        """
+        """Loads and Deborah numbers of the different cases, and the index of every case among the different cases."""
         before = self.problems.deborah[self.members]
         change = self.block.numbers("velocity_change")[self.members]
         after, loads = before * (1 + change), self.problems.loads[self.members]
-        first, which = combinations(before, after, loads)
+        first, which = combinations(before, after, loads)  # sorted by Deborah number, so that neighbours share work
         return loads[first], np.column_stack([before, after])[first], which
 
 
@@ -238,7 +233,7 @@ class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case on a quarter, half and all of the nodes. The time step is proportional to the node spacing."""
+        """Solve the case on up to three grids, with time steps that are proportional to the node spacing."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
@@ -260,7 +255,6 @@ class _Followed(_Group):
 
     @property
     def largest_loads(self) -> FloatArray:
-        """F_N / (4 G_inf L h), the largest value during the history."""
         case = self.block.case(int(self.members[0]))
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
@@ -277,7 +271,7 @@ class _Followed(_Group):
         return elements, (before / velocity, load / force), [piece.scaled(unit, velocity, force) for piece in history]
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a coarser grid. With every = 4, for example, the grid consists of every fourth node."""
+        """Compute the case on a coarser grid: for example, if `every` is 4, on every fourth node."""
         elements, before, history = self._history
         nodes = waves.points * self.oversampling
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
@@ -287,7 +281,6 @@ class _Followed(_Group):
 
     @property
     def operations(self) -> float:
-        """Approximate number of operations on the finest grid."""
         elements, _, history = self._history
         nodes, last = self.setting.roughness.points * self.oversampling, self.block.parameters.relaxation_times[-1]
         begun = [piece for piece in history if piece.start < last]
@@ -296,7 +289,6 @@ class _Followed(_Group):
 
 
 def _check_rough(roughness: Roughness) -> None:
-    """Raise DataError for a measured line that is flat."""
     if isinstance(roughness, Measured):
         height = line_of(roughness.profile).height
         rounding = height.size * np.finfo(float).eps * float(np.max(np.abs(height), initial=0.0))
