@@ -269,7 +269,6 @@ def _at_points(
     variance: FloatArray,
     tilt: FloatArray,
 ) -> None:
-    """Add the results at each point (see `Linear`)."""
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):

@@ -69,7 +69,7 @@ def fit_wlf(
     """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)`` to temperatures in K.
 
     First c1 / c2 and 1 / c2 are fitted with the anchor as reference; they remain finite if the factors are linear in
-    temperature. If the reference is higher by dT, the constants become ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
+    temperature. If the reference is dT above the anchor, c1 and c2 become ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
     straight = STRAIGHTEST / float(np.ptp(temperature))

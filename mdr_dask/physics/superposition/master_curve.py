@@ -19,16 +19,16 @@ EXPANSION = 6e-4
 """Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
 
 OFFSET = (0.02 / np.log(10), np.log(2))
-"""Prior of the vertical offset of a curve: median, decades, and standard deviation of the natural logarithm.
+"""Prior of the standard deviation of vertical offsets: median in decades, and scatter of the natural logarithm.
 
 Specimens are clamped again for each temperature, and their dimensions are known to about one per cent.
 """
 
 FREE = (0.03, 1.5)
-"""The same for the steps of free vertical factors about their mean."""
+"""Prior of the standard deviation of the steps of free vertical factors, in the form of `OFFSET`."""
 
 DETERMINED = 0.5
-"""The curves do not determine a step if its standard deviation exceeds this fraction of its prior value."""
+"""The curves do not determine a step whose standard deviation exceeds this fraction of the prior value."""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 
@@ -344,7 +344,7 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error ``(x - a) (b - x) |h''| / 2`` of the linear interpolation at x between the neighbours a and b.
 
-    The larger of the second derivatives h'' of the factors at both neighbours is used.
+    h'' is the larger of the second derivatives of the factors at a and b.
     """
     after = int(np.clip(np.searchsorted(places, place), 1, places.size - 1))
     slopes = np.diff(factors) / np.diff(places)

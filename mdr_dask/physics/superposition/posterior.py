@@ -62,7 +62,7 @@ class Curves:
     The origin of `x` is such that the smallest ``x + shift`` is near zero. `member` is the index of the curve of each
     point, and `height` the median height of a curve in each channel. `splines` is the number of spline coefficients of
     each channel. `offset` describes the prior of the standard deviation s of the vertical offsets: the median of s
-    in decades, and the standard deviation of ln s. It is None for curves without offsets. If `drifting` is True, the
+    in decades, and the standard deviation of ln s. Without offsets, `offset` is None. If `drifting` is True, the
     offsets change from curve to curve by steps. A step is a mean step plus a scatter; the prior standard deviation of
     the mean step is `TREND` times that of the scatter.
     """
@@ -193,10 +193,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return, at each position, the index of the first of the four splines there, and values and slopes of all four.
-
-    Positions are in units of cells.
-    """
+    """Return the first of the four splines at each position (in cells), and the values and slopes of all four."""
     # in a diverged row, positions may be NaN or infinite; such positions must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)

@@ -34,9 +34,8 @@ DIFFERENCE = 1e-3
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
-    For each pair of neighbouring curves, many values of the step between their two shifts are tried. The tried values,
-    weighted with the density of the pair, give the mean and the variance of the step. Both are then combined with the
-    prior of the shifts.
+    For each pair of neighbouring curves, many values of the step between their two shifts are tried. The mean and
+    the variance of the step, weighted with the density of the pair, are then combined with the prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, 81)  # in widths of the wider of the two curves
     means, variances = [], []
@@ -123,8 +122,8 @@ def _moved(
 def _reduction(kept: FloatArray) -> float:
     """Return the largest potential scale reduction factor of any parameter, close to 1 if all chains have converged.
 
-    It compares the variance of the means of the chains with the variance within the chains (A. Gelman, D. B. Rubin,
-    Stat. Sci. 7 (1992) 457). The shape of `kept` is (moves, chains, parameters).
+    The factor compares the variance of the means of the chains with the variance within the chains (A. Gelman, D. B.
+    Rubin, Stat. Sci. 7 (1992) 457). The shape of `kept` is (moves, chains, parameters).
     """
     within = kept.var(axis=0, ddof=1).mean(axis=0)
     between = kept.mean(axis=0).var(axis=0, ddof=1)
@@ -143,7 +142,7 @@ def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> t
     """In each row, draw one step again from its prior; return the new rows and the rise of the prior energy.
 
     A step is the difference between the shifts of two neighbouring curves. On a plateau the density has many small
-    maxima; by such jumps a chain can pass from one maximum to another.
+    maxima; with jumps, a chain passes from one maximum to another.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = step_precision(curves.count)

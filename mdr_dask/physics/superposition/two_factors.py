@@ -41,7 +41,7 @@ def superpose_twice(
     First all curves are superposed with independent factors. Then a and b are fitted to these factors, weighted by
     their covariance; to first order, the result is as if a and b were fitted to the curves directly. The factors are
     zero at the middle value of each quantity. If a `reference` is given, the factors of the first quantity are zero at
-    the value nearest to it instead.
+    the value nearest to the reference instead.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)

@@ -26,8 +26,7 @@ class CubicLine(NamedTuple):
     """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an elastomer element passes them.
 
     `enter` and `leave` are the slopes at the start and the end of each cell. If the line is not periodic, every element
-    is undeformed at the first node. A `smooth` line is periodic and has no kinks; the Euler-Maclaurin formula can then
-    compute the integrals of the squared slope.
+    is undeformed at the first node. A `smooth` line is periodic and has no kinks.
     """
 
     height: FloatArray
@@ -86,10 +85,10 @@ def without_kinks(line: CubicLine) -> CubicLine:
 class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
-    A periodic line starts in the cell of its highest point. Heights are relative to this point: under light loads, only
-    points slightly below it matter, and their small depths must not be lost to rounding. `peak` is the largest height
-    in each cell; `mean` and `stretch` are the integrals of the height and of the squared slope over each cell. A period
-    begins at the highest point: `start` is the position of this point in cell 0, and `top` is its height.
+    A periodic line starts in the cell of its highest point. Heights are relative to this point, so that small depths
+    under light loads are not lost to rounding. `peak` is the largest height in each cell; `mean` and `stretch` are the
+    integrals of the height and of the squared slope over each cell. A period begins at the highest point: `start` is
+    the position of this point in cell 0, and `top` is its height.
     """
 
     height: FloatArray
@@ -231,9 +230,8 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
-    The first cell is an exception: it keeps the integral of its polynomial, because a period begins and ends inside
-    this cell. The difference between both integrals of the first cell is distributed over the other cells, so that the
-    sum remains exact.
+    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The sum is
+    preserved by equal changes of the integrals of the other cells.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

@@ -20,8 +20,8 @@ Order = Literal["none", "mean", "plane", "parabola"]
 MOST_MISSING = 0.05  # largest accepted fraction of missing points; missing points are filled
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
 SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
-MOST_SCATTER = 0.02  # an octave is used if scatter alone causes angular harmonics with at most this mean square
-BY_SCATTER = 4.0  # on an isotropic map, an octave exceeds this many times that mean square in exp(-4) = 2 % of cases
+MOST_SCATTER = 0.02  # an octave is used if the mean square of an angular harmonic due to scatter alone is at most this
+BY_SCATTER = 4.0  # due to scatter, a squared harmonic exceeds this many times its mean in exp(-4) = 2 % of octaves
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 
 
@@ -84,7 +84,6 @@ def filled(surface: SurfaceMap) -> SurfaceMap:
 
 
 def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
-    """Return heights in which each missing point is the mean of its four neighbours."""
     # a frame around the map gives every point four neighbours; heights of missing points and of the frame are 0
     places = np.flatnonzero(np.pad(missing, 1))
     width = height.shape[1] + 2
@@ -143,13 +142,13 @@ class MapSpectrum:
     The width dq of a ring is 2 pi divided by the shorter side of the map. `density` is C2D, m^4: the power in a ring
     divided by the area of the ring, so that rms height and rms gradient are preserved. `count` is the number of waves
     in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves that are
-    statistically independent; it is less than 1 with a window. `rms_height`, m, is that of the windowed map. `slopes`
-    contains the mean square of the slope along x, the mean square of the slope along y, and the mean product of both
-    slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power; they
-    are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of straight profiles: first along
-    x, then along y. `axes` contains one number for each axis. In each ring, the power of the wave along the axis is
-    divided by the mean power of the waves. The number is the median of these ratios, divided by ln(2); it is 1 for an
-    isotropic surface.
+    statistically independent; it is less than 1 with a window. `rms_height`, m, is the rms height of the windowed map.
+    `slopes` contains the mean square of the slope along x, the mean square of the slope along y, and the mean product
+    of both slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by
+    power; they are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of straight profiles:
+    first along x, then along y. `axes` contains, for each axis, the power of the wave along this axis divided by the
+    mean power of the waves in the same ring. The ratio is a median over the rings, divided by ln(2): 1 for an isotropic
+    surface.
     """
 
     wavenumber: FloatArray
@@ -193,7 +192,7 @@ class MapSpectrum:
 
         The anisotropy is the larger of the second and the fourth angular harmonic of the power. The rms of each
         harmonic is taken over octaves of the wave number, without waves that are only noise. Octaves with few waves are
-        left out, because their harmonics have much scatter. What scatter alone may cause is subtracted.
+        left out, because their harmonics have much scatter. The part that scatter alone may cause is subtracted.
         """
         is_rough = self.wavenumber <= noise_limit(self.binned()) * (1 + 1e-9)
         there = np.flatnonzero(significant(self.wavenumber, self.density) & is_rough)
@@ -282,11 +281,8 @@ def _rings(
 
 
 def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings whose power cannot be due to the rounding of heights in a file.
-
-    The contribution of such a ring to the mean square of the height, or to that of the gradient, exceeds the fraction
-    `SIGNIFICANT` of the largest contribution of a ring.
-    """
+    """Return the rings whose power cannot be due to the rounding of heights in a file (see `SIGNIFICANT`)."""
+    # contributions to the mean squares of height and gradient
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > SIGNIFICANT * height.max()) | (gradient > SIGNIFICANT * gradient.max()))
 

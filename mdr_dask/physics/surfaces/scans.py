@@ -88,9 +88,9 @@ def _until_the_end(cut: Cut) -> slice:
 
 
 def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
-    """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform), and its errors.
+    """Return the isotropic spectrum C2D of a surface with the given cut, and the standard errors of log C2D.
 
-    The errors are standard errors of log C2D. They are large below the roll-off, where C2D hardly changes the cut.
+    The standard errors are large below the roll-off, where C2D hardly changes the cut.
 
     C2D, a power law between adjacent wave numbers of the cut, is found by a least-squares fit. The fit amplifies noise
     less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the slope d log C2D /
@@ -99,8 +99,7 @@ def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    # Waves beyond the last wave number of the cut contribute to the cut. C2D is assumed to end one bin beyond this wave
-    # number.
+    # waves beyond the last wave number of the cut contribute to the cut; C2D is assumed to end one bin beyond
     edge = q[-1] ** 2 / q[-2]
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)

@@ -82,7 +82,7 @@ def shares(t: float) -> Piece:
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     """Append to `found` the positions, between k and k + 1, at which piece k changes sign; return the new count.
 
-    There are at most three. There is none if all four coefficients are positive, or if none of the four is positive.
+    A piece changes sign at most three times. It does not change sign if all four coefficients have the same sign.
     """
     of = piece(spline, k)
     # the formula by which `piece` computes the first height of the next piece, so that adjacent pieces agree

@@ -32,7 +32,7 @@ class Waves:
     def from_place(self, place: float) -> Waves:
         """Return the line that starts at the position `place` (0 to 1) of this line.
 
-        On a grid with only two nodes per shortest wave, a part of the shortest wave may then be lost.
+        On a grid with only two nodes per shortest wave, a part of the shortest wave of the returned line may be lost.
         """
         wave = np.arange(1, self.coefficients.size + 1)
         return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)

@@ -25,10 +25,7 @@ FINEST = 64  # largest number of nodes per Nyquist point in steady states
 
 
 class Levels(NamedTuple):
-    """Steady drag before the jump, change of the drag at the jump, steady drag and steady depth after the jump.
-
-    The same class holds the errors of these quantities.
-    """
+    """Steady drag before the jump, change of the drag at the jump, steady drag and steady depth after the jump."""
 
     before: FloatArray
     jump: FloatArray
@@ -37,7 +34,7 @@ class Levels(NamedTuple):
 
     @classmethod
     def of(cls, limits: list[SteadyLimits]) -> Levels:
-        """Collect the four quantities of all cases; `limits` contains the steady limits of each case."""
+        """Return the quantities of all cases, from the steady limits of each case."""
         rows = [(each.before, each.at - each.before, each.after, each.depth[1]) for each in limits]
         return cls(*np.array(rows).reshape(-1, 4).T)
 
@@ -73,11 +70,10 @@ def solve_jumps(
     """Solve the velocity jumps on a line.
 
     Loads are F_N / (4 G L h), where h is the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2
-    tau / L. `accuracy` is the allowed relative error; for a depth smaller than h, the error is divided by h. If
-    `accuracy` is None, the steady states are solved on the grid of the march only, and no errors can be requested.
-    `oversampling`, an even number, is the number of nodes per Nyquist point in the march; the steady states use at
-    least as many. If `march` is None, the transient is not computed. `with_errors` states whether the error of the
-    transient is estimated.
+    tau / L. `accuracy` is the allowed relative error; the error of a depth smaller than h is divided by h. If
+    `accuracy` is None, the steady states are solved on the grid of the march only, and no errors can be requested. The
+    march uses `oversampling` (an even number) nodes per Nyquist point, and the steady states at least as many. If
+    `march` is None, the transient is not computed; if `with_errors` is True, its error is estimated.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -126,7 +122,7 @@ def solve_jumps(
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth of a jump that was not marched; they are equal to the neglected changes."""
+    """Return the neglected changes of drag and depth as the errors of a jump that was not marched."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -134,15 +130,12 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and depth between two paths from each of the given times on.
-
-    The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. If there
-    is no path on the coarse grid, the differences are infinite.
-    """
+    """Return the largest changes of drag and depth between fine and coarse grid, from each of the times to the end."""
     if coarse is None:
         return np.full((2, times.size), np.inf)
     everywhere = np.union1d(times, fine.time)
     ends = [np.array([each.after, each.depth[1]]) for each in (limits, others)]
+    # the steady state on the same grid is subtracted from each path
     beyond = [path.at(everywhere, end) - end[:, None] for path, end in zip((fine, coarse), ends, strict=True)]
     change = np.abs(beyond[0] - beyond[1])
     later = np.maximum.accumulate(change[:, ::-1], axis=1)[:, ::-1]

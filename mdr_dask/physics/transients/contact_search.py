@@ -7,9 +7,8 @@ falls through zero, or where free elements arrive with a displacement larger tha
 Contact begins where the line rises above the free elements and the force would be positive. Most cells are skipped
 because of bounds (`_skip_pressed`, `_skip_free`); the bounds are rigorous, so that no contact is missed.
 
-Free elements may pass the highest point without contact, and travel more than a whole period of the line. If there may
-be such elements, the search is repeated; this time it includes the elements that separated from the line in the
-previous period.
+Free elements may pass the highest point without contact and travel more than a whole period of the line. If this is
+possible, the search is repeated with the elements that separated from the line in the previous period.
 """
 
 from __future__ import annotations
@@ -62,7 +61,14 @@ VISITS = 6  # largest number of changes of contact in a cell: a cubic force chan
 LEFT_LIMITS = -1  # outcome if a patch extends beyond its run of cells, or if there are too many patches
 
 # Entries of `Workspace.scan`, the state of the search
-BEGIN, FREE_FROM, HELD, FIRM_LIFT, FIRM_UNTIL, LOWEST = range(6)
+(
+    BEGIN,  # place where the current patch begins
+    FREE_FROM,  # place where contact or a positive force last ended
+    HELD,  # place up to which contact is certain
+    FIRM_LIFT,  # cells in contact can be skipped if their barrier is below this lift
+    FIRM_UNTIL,  # place up to which `FIRM_LIFT` is valid
+    LOWEST,  # least displacement of free elements at the end of the previous cell
+) = range(6)
 
 
 class Reachable(NamedTuple):
@@ -79,11 +85,8 @@ class Reachable(NamedTuple):
 class Workspace(NamedTuple):
     """Work arrays of a search, and the results: the patches, and the sums over the patches with their derivatives.
 
-    The entries of `scan` are: place where the current patch begins; place where contact or a positive force last ended;
-    place up to which contact is certain; a limit (cells in contact with a barrier below this limit can be skipped);
-    place up to which this limit is valid; and least displacement of free elements at the end of the previous cell. The
-    barriers of the cells belong to the Deborah number after the jump. `free_until` contains, for each cell, the largest
-    depth at which the cell is certainly out of contact.
+    The barriers of the cells belong to the Deborah number after the jump. `free_until` contains, for each cell, the
+    largest depth at which the cell is certainly out of contact.
     """
 
     start: FloatArray
@@ -96,7 +99,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> Workspace:
-    """Return a workspace that has space for 4 `patches` + 4096 patches."""
+    """Return a workspace for up to 4 `patches` + 4096 patches."""
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
     earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
@@ -121,7 +124,7 @@ class Motion(NamedTuple):
 
 
 class Search(NamedTuple):
-    """Quantities that are constant during a search, and the arrays that are written; the line has n cells."""
+    """Constants and work arrays of a search; the line has n cells."""
 
     now: Instant
     motion: Motion
@@ -152,10 +155,7 @@ class Cell(NamedTuple):
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the contact patches at the last instant of the history; return their number, or `LEFT_LIMITS`.
 
-    The runs must contain all patches at this depth. The patches and their `sums` are written to the workspace. The sums
-    are: load and drag, divided by 4 G dx; length in contact; integral of the slope over the length in contact;
-    derivatives of load and drag with respect to the depth; and the rates at which load and drag change because patches
-    grow.
+    The patches and the sums over the patches are written to the workspace.
     """
     last, recovery = now.history.count - 1, work.recovery
     motion = _motion_until(now, reachable.second)
@@ -180,10 +180,6 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
 
 @jit_inline_uncounted
 def _motion_until(now: Instant, second: float) -> Motion:
-    """Return the `Motion` until now.
-
-    The argument `second` is the largest height outside the patch that contains the highest point.
-    """
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
     lift, rise, fall, passes_top = depth + rate, 0.0, 0.0, False
@@ -209,16 +205,13 @@ def _motion_until(now: Instant, second: float) -> Motion:
 
 @jit_uncounted
 def _search_period(search: Search, runs: IntArray) -> int:
-    """Search one period of the line; return the number of patches, or `LEFT_LIMITS`.
-
-    The places of separation that are stored in the workspace at the start belong to the previous period. Without such
-    places, only elements that have been free since before the jump can pass the highest point out of contact.
-    """
+    """Search one period of the line; return the number of patches, or `LEFT_LIMITS`."""
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
     sums[:] = 0.0
     scan[BEGIN] = scan[FREE_FROM] = scan[HELD] = origin
     scan[FIRM_UNTIL] = scan[LOWEST] = 0.0
+    # at the highest point, elements may be free since the previous period, or since before the jump
     contact, found = search.depth >= displacement_at(now, work.recovery, origin)[0], 0
     if not contact:
         _add_separation(search, origin)
@@ -247,10 +240,7 @@ def _search_period(search: Search, runs: IntArray) -> int:
 
 @jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first place where elements that are now further along the line may have separated.
-
-    If no such place is stored, return `otherwise`.
-    """
+    """Return the first stored place of separation, or `otherwise` if no place is stored."""
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 
@@ -258,10 +248,9 @@ def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
 def _skip_pressed(search: Search, i: int, stop: int) -> int:
     """Search from cell i on, and return the first cell in which contact may end or elements may have separated.
 
-    A cell is skipped under two conditions: the force was positive on all elements that passed the cell and are now
-    further along the line, and the displacement u of free elements cannot exceed w = depth + h in the cell. Along the
-    line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the largest drift (see
-    `free_recovery`).
+    A cell is skipped if no element has separated in the cell, and if the displacement u of free elements stays below
+    w = depth + h. Along the line u' = (drift - u) / D (see `free_recovery`), so that u stays below w wherever w + D h'
+    exceeds the largest drift.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     bounds, begin = work.recovery.bounds, scan[BEGIN]
@@ -284,9 +273,9 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 def _skip_free(search: Search, i: int, stop: int) -> int:
     """Search from cell i on, and return the first cell in which contact may begin.
 
-    The displacement of free elements has a lower bound, computed along the line from the last known displacement and
-    the least drift. Here the *gap* is this bound minus the largest depth + h in the cell. If the gap is too wide to
-    have opened since the elements separated, there was a gap all the time, and the cell is skipped.
+    A cell is skipped if the gap between free elements and line is too wide to have opened since the elements separated.
+    The gap follows from a lower bound of the displacement: the last known displacement, decayed towards the least
+    drift.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, lift = now.track, work.recovery.bounds, search.lift
@@ -307,10 +296,7 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
-    """Return whether the elements in a cell certainly had a gap to the line all the time, so that they stay free.
-
-    The free elements in the cell separated at the place `oldest` or further along the line.
-    """
+    """Return whether the elements in a cell certainly had a gap to the line since they separated beyond `oldest`."""
     opened = search.work.recovery.bounds.opened
     return gap > 0 and gap > opened[window(2 * (cell + 1 - oldest))]
 
@@ -358,11 +344,10 @@ def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, i
 
 @jit_inline_uncounted
 def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bool, bool]:
-    """Find where contact ends in a cell beyond x; return two places and two flags.
+    """Find where contact ends in a cell beyond x.
 
-    Contact ends at the first place; the search for the next contact starts at the second. The first flag is True if
-    free elements arrive with a displacement larger than depth + h, the second if the force falls to zero. If contact
-    does not end in the cell, both flags are False.
+    Return the place where contact ends, the place where the search continues, whether free elements arrive with a
+    displacement larger than depth + h, and whether the force falls to zero.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     place = NONE
@@ -406,7 +391,7 @@ def _overtaking(search: Search, held: float, x: float, w: float) -> float:
 
 @jit_inline_uncounted
 def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
-    """Store the current patch, and write a lower bound of the displacement of free elements one cell beyond it."""
+    """Store the current patch, and a lower bound of the displacement of free elements one cell beyond the patch."""
     now, motion, work, scan = search.now, search.motion, search.work, search.work.scan
     if is_lost:
         _, slope, _, by_depth, opening = gap_at(now, work.recovery, end)
@@ -430,8 +415,8 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     """Return whether contact begins beyond x in a cell, and the place where contact begins or the search continues.
 
     Contact can begin only between `low`, where the force becomes positive, and `high`, where the force falls to zero
-    again. Without contact, `high` is stored as a place of separation, because elements may have separated there at an
-    earlier instant. If `ended` is True, contact or a positive force has just ended at x.
+    again. If contact does not begin, `high` is stored as a place of separation, because elements may have separated
+    there at an earlier instant. If `ended` is True, contact or a positive force has just ended at x.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
@@ -467,11 +452,10 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
 
 @jit_inline_uncounted
 def _add_edge(search: Search, place: float, steep: float, by_depth: float, opening: float) -> None:
-    """Add the changes of load and drag that are caused by the motion of one edge of a patch.
+    """Add the changes of load and drag that are caused by the motion of an edge at which the force is not zero.
 
-    The force at this edge is not zero. The edge moves if the depth or the time changes. The gap is depth + h - u, with
-    the displacement u of free elements. `steep` is the slope of the gap towards the inside of the patch, `by_depth` the
-    derivative of the gap with respect to the depth, and `opening` its derivative with respect to time.
+    `steep` is the slope of the gap towards the inside of the patch. `by_depth` and `opening` are the derivatives of the
+    gap with respect to depth and time.
     """
     sums = search.work.sums
     h, slope, _ = height_at(search.now.track, place)
@@ -486,10 +470,7 @@ def _add_edge(search: Search, place: float, steep: float, by_depth: float, openi
 
 @jit_inline_uncounted
 def _add_separation(search: Search, place: float) -> None:
-    """Add a place where the force falls to zero now.
-
-    The entry also contains the farthest place where the force may have fallen to zero since the jump.
-    """
+    """Add a place of separation, with the farthest place where the force may have fallen to zero since the jump."""
     now, recovery, highest = search.now, search.work.recovery, search.motion.highest
     i = min(int(place), search.n)
     h, slope, _ = height_at(now.track, i + 1.0)
@@ -518,7 +499,7 @@ def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
 
 @jit_inline_uncounted
 def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
-    """Return three Bernstein coefficients of the slope of the force in a cell; they enclose the slope."""
+    """Return three Bernstein coefficients of the slope of the force in a cell; the slope lies between them."""
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
     return enter, enter + bend, enter + 2 * bend + turn
@@ -526,10 +507,7 @@ def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, f
 
 @jit_inline_uncounted
 def _may_have_separated(search: Search, i: int) -> bool:
-    """Return whether elements may have separated in cell i or just before it, although the force is positive now.
-
-    The force on such an element fell through zero and became positive again while the element travelled.
-    """
+    """Return whether elements may have separated in cell i or just before it, although the force is positive now."""
     track, motion, deborah = search.now.track, search.motion, search.now.deborah
     start, middle, end = _force_slopes(track, deborah, i)
     if deborah * max(start, middle, end) <= -motion.rise:

@@ -26,7 +26,7 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Patches, Track, height_at
 
 STRIDE = 2.0  # longest step towards a place of separation, in cells
-ROUNDING = 1e-9  # smaller distances, in cells, and smaller relative differences of displacements are rounding errors
+ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
 # cells travelled in the shortest window; number of windows, each twice as long as the previous one
 WINDOW, WINDOWS = 8.0, 16
 
@@ -34,8 +34,8 @@ WINDOW, WINDOWS = 8.0, 16
 class Instant(NamedTuple):
     """An instant after the jump: the line, the contact before the jump, and the depth and its rate up to this instant.
 
-    `time` is the time since the jump, `deborah` belongs to the velocity after the jump, and `left` is exp(-time), the
-    decay of displacements since the jump.
+    `time` is the time since the jump, `deborah` belongs to the velocity after the jump, and `left` is exp(-time),
+    the factor by which displacements have decayed since the jump.
     """
 
     track: Track
@@ -87,10 +87,10 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     left, back = np.exp(-time), last
     shallowest, deepest, least_lift = depth, depth, depth + rate
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
-    if first.deborah > deborah:  # the drift of elements that have been free since before the jump is u (1 - D / D_1)
+    if first.deborah > deborah:  # drift of elements that have been free since before the jump: u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes the part of this increase in the window, up to half a window after the jump.
+    # passed earlier. `opened` includes this increase from the start of the window until half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k
@@ -112,10 +112,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the shortest window in which the line travels more than `distance` cells.
-
-    If even the longest window is too short, return the index of the longest.
-    """
+    """Return the index of the shortest window with a travel of more than `distance` cells, or of the longest window."""
     return min(max(frexp(distance / WINDOW)[1], 0), WINDOWS - 1)
 
 
@@ -164,8 +161,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
     """Return displacement, slope and du/d(depth) of an element at x that separated near a place.
 
     The place of separation is between `place`, where the force vanishes now, and `farthest`, the farthest place where
-    the force has vanished since the jump. The displacement is stationary with respect to this place; few Newton steps
-    are enough. The returned displacement is -1 if the element did not separate between `place` and `farthest`.
+    the force has vanished since the jump. The returned displacement is -1 if the element did not separate there.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -264,14 +260,13 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
     """Return the gap at x, and its slope, curvature, derivative with respect to the depth, and rate.
 
-    The gap is depth + h - u, positive where the line is above free elements. At a fixed place x, the displacement of
-    free elements changes at the rate -u - D u'. For the curvature of the gap, this displacement is approximated by an
-    exponential function along the line.
+    The gap is depth + h - u, positive where the line is above free elements with the displacement u.
     """
     u, u_slope, by_depth = displacement_at(now, recovery, x)
     last = now.history.count - 1
     h, h_slope, h_bend = height_at(now.track, x)
-    bend = h_bend - (u_slope * u_slope / u if u > 0 else 0.0)
+    bend = h_bend - (u_slope * u_slope / u if u > 0 else 0.0)  # u is taken as an exponential function along the line
+    # at a fixed place, du/dt = -u - D u'
     opening = now.history.rate[last] + u + now.deborah * u_slope
     return now.history.depth[last] + h - u, h_slope - u_slope, bend, 1 - by_depth, opening
 
@@ -280,10 +275,9 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
-    """Return the place where the line rises above free elements, and three derivatives of the gap at this place.
+    """Return the place where the line rises above free elements, with the derivatives of the gap at this place.
 
-    The derivatives are those with respect to the place, to the depth and to time. The first guess x is between `low`
-    and `high`.
+    The gap is differentiated with respect to place, depth and time. The first guess x is between `low` and `high`.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
     for _ in range(NEWTON_STEPS):
@@ -331,7 +325,7 @@ def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepes
     for k in range(recovery.count[0]):
         place, farthest = recovery.place[k], recovery.farthest[k]
         u = _from_separation(now, recovery, k, x)[0]
-        # elements that are now beyond x may have separated at this place
+        # elements that are now beyond x may have separated at `place`
         if u < 0 and x - now.deborah * now.time < farthest:
             height = height_at(now.track, _in_period(now, place))[0]
             u = (deepest + height) * np.exp(-max(x - farthest, 0.0) / now.deborah)

@@ -44,7 +44,7 @@ class PreparedLine(NamedTuple):
 
     @classmethod
     def of(cls, line: CubicLine) -> PreparedLine:
-        """Prepare a line; its barriers are computed later, when they are needed."""
+        """Prepare a line; the barriers are computed when they are needed."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
@@ -120,7 +120,7 @@ def steady_limits(
         fast = float(deborah[k, 1] * n)
         at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
         slower, outcome = both[int(np.argmin(deborah[k]))], Outcome(end)
-        is_full = both[0].start.size == both[1].start.size == 1  # at the end of a free recovery, a second patch begins
+        is_full = both[0].start.size == both[1].start.size == 1  # free elements are followed by a second patch
         found.append(
             SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], is_full, outcome)
         )
@@ -147,7 +147,7 @@ def _release(
         if sums[LENGTH] <= 0:
             break
         miss = load - sums[LOAD]
-        step = miss / sums[LENGTH]
+        step = miss / sums[LENGTH]  # the length in contact is the derivative of the load with respect to the rate
         rate += step
         if abs(miss) <= NEARLY * load:
             return sums[DRAG] + step * sums[TILT], rate, sums[TILT], Outcome.CONVERGED

@@ -34,7 +34,7 @@ class Marching(NamedTuple):
 
     `first` is the contact before the jump. `reachable` contains the cells where contact is possible at depths from
     `low` to `high`. `deborah` belongs to the velocity after the jump, and `load` is F_N / (4 G dx). The instants are
-    equidistant in log(1 + t / onset), with the spacing `pace`. `close` is the largest last step of Newton's method.
+    equidistant in log(1 + t / onset), with the spacing `pace`. Newton's method ends with a step of at most `close`.
     """
 
     track: Track
@@ -64,14 +64,12 @@ class Trajectory(NamedTuple):
 
 @jit_uncounted
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
-    """Return the rate of the drag at constant load.
-
-    Growing patches add load; the lift (the depth plus its rate) falls to compensate for it. The last Newton `step` of
-    the depth also changes the rate of the depth, and therefore the growth of the patches.
-    """
+    """Return the rate of the drag at constant load, after the last Newton `step` of the depth."""
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
+    # the step changes the rate of the depth, and therefore the growth of the patches
     growth, drag_growth = sums[GROWTH] + edges * stiff * step, sums[DRAG_GROWTH] + edges_drag * stiff * step
+    # the depth plus its rate falls, to compensate for the load of growing patches
     lift = -growth / sums[LENGTH] if sums[LENGTH] > 0 else 0.0
     return float(lift * sums[TILT] + drag_growth)
 
@@ -118,13 +116,9 @@ def _balance(
 
 @jit_uncounted
 def _weights(marching: Marching, found: Trajectory, now: int) -> tuple[float, float]:
-    """Return the numbers a and b: if d is the depth at instant `now` of a march, the rate of the depth is a d + b.
-
-    The numbers follow from backward differentiation with respect to log(1 + t / onset), because the relaxation is a
-    smooth function of this variable. In the first step, they follow from the known rate just after the jump.
-    """
+    """Return the numbers a and b for which the rate of the depth d at instant `now` of a march is a d + b."""
     depth = found.depth
-    if now == 1:
+    if now == 1:  # from the known rate just after the jump
         taken = found.time[1]
         return 2 / taken, -2 * depth[0] / taken - found.rate[0]
     scale = 1 / (marching.pace * (marching.onset + found.time[now]))
@@ -150,8 +144,8 @@ def _extrapolated(found: Trajectory, now: int) -> float:
 def march_depth(marching: Marching, found: Trajectory, work: Workspace) -> int:
     """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
-    `found` contains all times and the first instant; the other instants are written. Return an `Outcome` or
-    `LEFT_LIMITS`.
+    `found` contains all times; the other quantities are known at the first instant, and written for later instants.
+    Return an `Outcome` or `LEFT_LIMITS`.
     """
     time, depth, rate, drag, drag_rate = found
     for now in range(1, time.size):

@@ -16,9 +16,19 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
-NEWTON_STEPS = 60  # largest number of steps of Newton's method; so many bisections reach machine precision
-CLOSE = 1e-2  # largest last step towards an edge of contact, in cells; the error is about the cube of this step
-LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
+NEWTON_STEPS = 60  # largest number of steps of Newton's method; as many bisections would reach machine precision
+CLOSE = 1e-2  # the last step towards an edge of contact, in cells, is smaller; the error is about the cube of this step
+# Entries of the sums over the patches; load and drag are divided by 4 G dx
+(
+    LOAD,
+    DRAG,
+    LENGTH,  # length in contact
+    TILT,  # integral of the slope over the length in contact
+    STIFFNESS,  # derivative of the load with respect to the depth
+    DRAG_STIFFNESS,
+    GROWTH,  # rate at which the load changes because patches grow
+    DRAG_GROWTH,
+) = range(8)
 SUMS = 8
 
 Cubic = tuple[float, float, float, float]  # coefficients of the height of the line in a cell, constant first
@@ -62,10 +72,7 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """Depth and its rate at ``count`` instants.
-
-    The derivative of the last rate with respect to the last depth is ``stiff``.
-    """
+    """Depth and rate at `count` instants; `stiff` is the derivative of the last rate with respect to the last depth."""
 
     time: FloatArray
     depth: FloatArray
@@ -121,8 +128,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return the first place x between y and 1 where p + q x + r x^2 + c x^3 falls through zero, or `NONE`.
 
-    The cubic is not negative at y. If its Bernstein coefficients on [y, 1] decrease, the cubic decreases as well, and
-    Newton's method finds the zero.
+    The cubic is not negative at y.
     """
     width = 1 - y
     begin, end = p + y * (q + y * (r + y * c)), p + q + r + c
@@ -132,6 +138,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
         return NONE
     if not (begin >= near >= far >= end and begin > 0 >= end):
         return float(contact_end(p, q, r, c, 0.0, y))
+    # the Bernstein coefficients on [y, 1] decrease, and so does the cubic
     low, high, x = y, 1.0, y + width * begin / (begin - end)
     for _ in range(NEWTON_STEPS):
         value = p + x * (q + x * (r + x * c))
@@ -142,7 +149,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
         falls = q + x * (2 * r + x * 3 * c)
         step = -value / falls if falls < 0 else NONE
         if abs(step) < CLOSE:
-            bend = (r + 3 * c * x) / falls  # step of Halley's method
+            bend = (r + 3 * c * x) / falls  # for a step of Halley's method
             return min(max(x + step / (1 + bend * step) if abs(bend * step) < 0.5 else x + step, y), 1.0)
         x = x + step if low < x + step < high else 0.5 * (low + high)
     return x
@@ -150,20 +157,14 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
 
 @jit_inline_uncounted
 def unloading(line: Cubic, lift: float, deborah: float, y: float) -> float:
-    """Search a cell from y on, and return the first place where the force falls through 0, or `NONE`.
-
-    The force is lift + h + deborah h'.
-    """
+    """Search a cell from y on, and return the first place where `force_at` falls through 0, or `NONE`."""
     c0, c1, c2, c3 = line
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
 @jit_inline_uncounted
 def loading(line: Cubic, lift: float, deborah: float, y: float) -> float:
-    """Search a cell from y on, and return the first place where the force rises through 0, or `NONE`.
-
-    The force is lift + h + deborah h'.
-    """
+    """Search a cell from y on, and return the first place where `force_at` rises through 0, or `NONE`."""
     c0, c1, c2, c3 = line
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
@@ -189,9 +190,7 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
     """Add up the forces just after a jump, from the contact before the jump and the new rate of the depth.
 
     Displacements and depth do not change at the jump; contact continues only where the force is positive at the new
-    velocity and rate. `deborah` and `barriers` are those after the jump. `sums` receives load and drag, divided by 4 G
-    dx, the length in contact, and the integral of the slope over this length. The length in contact is also the
-    derivative of the load with respect to the rate.
+    velocity and rate. `deborah` and `barriers` are those after the jump. The results are written to `sums`.
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)

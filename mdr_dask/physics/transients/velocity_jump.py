@@ -19,8 +19,8 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-NEGLIGIBLE = 1e-5  # least change of the steady depth that is used, divided by the mean displacement
-MEMORY = 7.0  # relaxation times after which the displacements at the jump have decayed, to less than 0.1 %
+NEGLIGIBLE = 1e-5  # a smaller change of the steady depth is replaced by this fraction of the mean displacement
+MEMORY = 7.0  # relaxation times until a march ends; the displacements at the jump have then decayed to less than 0.1 %
 STEEPEST = 3.0  # a cubic does not overshoot if its slopes are at most three times the secant (Fritsch and Carlson)
 
 
@@ -54,9 +54,9 @@ class Path(NamedTuple):
     def at(self, times: FloatArray, after: FloatArray) -> FloatArray:
         """Return drag and depth at increasing times, shape (2, times).
 
-        Between instants both are cubic in log(1 + t / t_1), where t_1 is the first instant after the jump. If the
-        velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) at the trailing
-        edge of every patch. After the last instant drag and depth are equal to the steady values in `after`.
+        Between instants, drag and depth are cubic in log(1 + t / t_1), where t_1 is the first instant after the jump.
+        If the velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) at the
+        trailing edge of every patch. After the last instant, the result is the steady values in `after`.
         """
         power = 0.5 if self.falls else 1.0
         passed, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -68,9 +68,8 @@ class Path(NamedTuple):
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
     """Interpolate curves by cubics with given slopes, and return the values at `places`.
 
-    Each row contains the points of one curve. If the first slope of a row is NaN, the first piece is a parabola. A
-    slope that is much steeper than the secants at its point is due to a single asperity that enters or leaves contact.
-    Such a slope is reduced, so that the cubic does not overshoot.
+    Each row contains the points of one curve. If the first slope of a row is NaN, the first piece is a parabola. Where
+    a single asperity enters or leaves contact, the slope is reduced, so that the cubic does not overshoot.
     """
     secants = np.diff(rows) / np.diff(x)
     beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
@@ -104,7 +103,7 @@ class Jump(NamedTuple):
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return the friction of a Kelvin foundation after one velocity jump at constant load, from its steady limits.
+    """Return the friction of a Kelvin foundation after one velocity jump at constant load, given the steady limits.
 
     The load is F_N / (4 G L), in the unit of height. `deborah` contains v_1 tau / L and v_2 tau / L.
     """
@@ -155,21 +154,18 @@ class _Relaxation(NamedTuple):
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
     def transient(self) -> float:
-        """Estimate the size of the transient, with a safety factor of two.
-
-        As the drag may cross its steady value, three terms are added: the change of the drag after the jump, the drag
-        due to the rate of the depth just after the jump, and the drag due to the change of the depth.
-        """
+        """Estimate the size of the transient, with a safety factor of two."""
         _, sums = self.line.patches(self.ends[1], self.deborah[1])
         by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
         limits = self.limits
+        # absolute values are added, because the drag may cross its steady value
         return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
 
     def march(self) -> tuple[Marching, Trajectory, Workspace, Outcome]:
         """March from one steady state to the next.
 
         The depth may leave the interval between the steady depths by the length of this interval. If the depth leaves
-        the interval by more, the march is repeated with 4 times and then with 16 times this margin.
+        the interval by more, the march is repeated with 4 times, and then with 16 times the length as margin.
         """
         for widening in (1, 4, 16):
             marching, found, work = self.begun(widening * self.change)
@@ -181,33 +177,29 @@ class _Relaxation(NamedTuple):
     def begun(self, margin: float) -> tuple[Marching, Trajectory, Workspace]:
         """Return the constants, trajectory and workspace of a march.
 
-        The depth may leave the interval between the steady depths by `margin`. The trajectory contains all times, but
-        otherwise only the first instant.
-
-        The times are equidistant in log(1 + t / onset). The onset is the time in which the line travels 1 / q_max at
-        the speed v_2, but at most one relaxation time. If the velocity falls, contact at the trailing edge of a
-        patch grows at the speed v_1 - v_2, which replaces v_2 if it is larger. This contact grows as sqrt(t), so that
-        the first step must then end before the first requested time.
+        The depth may leave the interval between the steady depths by `margin`. The times are equidistant in
+        log(1 + t / onset). The onset is the time in which the line travels 1 / q_max at the larger of the speeds v_2
+        and v_1 - v_2, but at most one relaxation time.
         """
         line, limits, request = self.line, self.limits, self.request
         assert limits.first is not None
         assert limits.slower is not None
         before, after = self.deborah / line.track.cells
         onset = min(1.0, 1 / (request.wavenumber * max(after, before - after)))
-        if after < before:
+        if after < before:  # as contact grows as sqrt(t), the first step must not end after the first requested time
             onset = min(onset, float(request.times[request.times > 0][0]) / (10 ** (1 / request.per_decade) - 1))
         until = min(request.times[-1], MEMORY)
         last = np.log1p(until / onset)
         steps = int(np.ceil(last / np.log(10) * request.per_decade))
         found = Trajectory(onset * np.expm1(np.linspace(0, last, steps + 1)), *np.empty((4, steps + 1)))
-        found.time[-1] = until  # without rounding error, because `until` may be requested
+        found.time[-1] = until  # without rounding error, because a result may be requested at this time
         for column, value in zip(found[1:], (self.ends[0], limits.rate, limits.at, np.nan), strict=True):
             column[0] = value
         low, high = max(self.ends.min() - margin, 0.0), self.ends.max() + margin
         runs, free_until = _runs(line.track, limits.slower, low, high)
         begin, end = int(np.ceil(limits.slower.end[0])), int(limits.slower.start[-1])
         reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
-        # the error after the last Newton step is of fourth order in the time step, that of the differentiation of third
+        # with this bound, the error of Newton's method is of fourth order in the time step
         close = self.change / request.per_decade**2
         marching = Marching(
             line.track, limits.first, reachable, self.deborah[1], self.load, low, high, onset, last / steps, close
@@ -217,11 +209,9 @@ class _Relaxation(NamedTuple):
 
 @jit
 def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntArray, FloatArray]:
-    """Return the runs of cells where contact is possible at depths from `low` to `high`, and a bound for each cell.
+    """Return the first and last node of each run of cells where contact is possible at depths from `low` to `high`.
 
-    A run is given by its first and last node. The bound is the largest depth at which the cell is certainly out of
-    contact. It follows from the steady state at the lower velocity: at a smaller depth, the displacements are smaller
-    by at most the difference of the two depths.
+    Also return, for each cell, the largest depth at which the cell is certainly out of contact.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)
@@ -231,6 +221,7 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
         free = slower.pressed[k] * np.exp(-(first - slower.end[k]) / slower.deborah)
         for i in range(first, last):
             free *= decay
+            # at a smaller depth, displacements are smaller by at most the difference of the two depths
             bound[i] = free - (slower.depth - low) - track.peak[i]
     runs, count = np.empty((cells // 2 + 1, 2), np.int64), 0
     for i in range(cells):

@@ -20,7 +20,7 @@ from mdr_dask.physics.wear.slip import TOLERANCE, GrossSlip, Moment, PartialSlip
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
-MOST_STEPS = 20000  # a march with more steps fails: limit of computing time
+MOST_STEPS = 20000  # a march with more steps fails, which limits the computing time
 MOST_ITERATIONS = 12  # Newton iterations of one step; a step that is short enough needs about three
 GROWTH = 1.8  # largest ratio of a step to the previous step: formulas of order 3 need a bound to be stable
 
@@ -41,9 +41,8 @@ def march(
 ) -> list[Any]:
     """Return the contact at the start and at the end of every accepted step.
 
-    The last step ends at or beyond `end`, or at a moment for which `stops` returns True. `tolerance` is the error of
-    `Problem.worn` that is allowed in one step, and `first` is the length of the first step. The steps do not depend on
-    `end`.
+    The last step ends at or beyond `end`, or at the first moment for which `stops` returns True. `tolerance` is the
+    error of `worn` of the problem that is allowed in one step, and `first` is the length of the first step.
     """
     newton = _Newton(problem)
     history = [settled(problem) if start is None else start]
@@ -78,7 +77,7 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
-    if time < np.finfo(np.float64).tiny:  # 1 / time would overflow
+    if time < np.finfo(np.float64).tiny:  # such a time counts as 0, because 1 / time would overflow
         return 0, history[0]
     newton, past, next_time = _Newton(problem), list(history[:before]), time
     while past[-1].time < time:
@@ -188,10 +187,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return one weight for each time.
-
-    The weighted sum of values at these times is the derivative at times[0] of the polynomial through the values.
-    """
+    """Return weights: the weighted sum of values at `times` is the derivative of their polynomial at times[0]."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -204,10 +200,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return one weight for each of the `times`.
-
-    The weighted sum of values at these times is the value at `time` of the polynomial through the values.
-    """
+    """Return weights: the weighted sum of values at `times` is the value of their polynomial at `time`."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

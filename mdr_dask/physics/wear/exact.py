@@ -1,7 +1,6 @@
 """Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force.
 
-Each contact is solved three times, each time with coarser panels and longer steps. The differences between these
-solutions give the errors of the first one.
+The errors of a solution follow from its differences to two solutions with coarser panels and longer steps.
 """
 
 from __future__ import annotations
@@ -34,23 +33,22 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-COARSEST = 2e-3  # largest error for which panels are chosen: coarser panels do not resolve the image of a steep body
-COARSEST_OF_MOVING = 3e-4  # the same for constant force, where longer steps cannot follow the stick border
+COARSEST = 2e-3  # largest `accuracy` that is used: coarser panels would not resolve the image of a steep body
+COARSEST_OF_MOVING = 3e-4  # the same under constant force, where longer steps could not follow the stick border
 #: If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
 #: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is then below the rounding error.
 ENDED = 1e4
 JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta in the panel next to the border exceeds this value
-ROUGHER = 4.0  # ratio of the step tolerance of each coarser solution to that of the previous solution
-#: The stated error of a radius is at least this fraction of its change in the last time step. All solutions share this
-#: error: a position that the edge passes within a step begins to wear only at the end of the step.
+ROUGHER = 4.0  # from each solution to the next coarser one, the error allowed in a step grows by this factor
+#: The stated error of a radius is at least this fraction of its change in the last time step. All solutions have
+#: this error, because a position that the edge passes within a step begins to wear only at the end of the step.
 EDGE = 0.2
 
 
 class Resolution(NamedTuple):
-    """Panels and steps for a given `accuracy`: the allowed error of the profile f, divided by eta d0.
+    """Panels and steps for a given `accuracy`, the allowed error of the profile f divided by eta d0.
 
-    `rougher` is 0 for the solution itself. It is 1 and 2 for the two coarser solutions from which the error is
-    estimated.
+    `rougher` is 0 for the solution itself, and 1 or 2 for the coarser solutions from which its error is estimated.
     """
 
     accuracy: float
@@ -63,14 +61,11 @@ class Resolution(NamedTuple):
 
     @property
     def flat(self) -> float:
-        """The rise (d - 1) / eta up to which the border is that of the virgin body, pressed to this depth.
-
-        The border of a steep body moves far during the first moments of wear.
-        """
+        """The rise (d - 1) / eta of the depth up to which the border is the stick border of the unworn body."""
         return self.step / BORDER_WEIGHT
 
     def panels(self, near: int) -> Panels:
-        """Return the panels for partial slip, which are halved `near` more times towards the stick border."""
+        """Return the panels for partial slip, with `near` more halvings at the stick border than at the edge."""
         digits = -np.log10(self.accuracy)
         levels = round(2.7 * digits - 3.3)
         order = max(int(digits) + 1, 4)
@@ -78,11 +73,9 @@ class Resolution(NamedTuple):
         return graded_panels(left, right, order - min(self.rougher, 1))
 
     def panels_in_gross_slip(self, sharpness: float) -> Panels:
-        """Return panels that resolve the pressure jump at the edge, and the tip of a sharp body (see `_slid`).
-
-        The error at the tip is the height of the profile within the innermost panel.
-        """
+        """Return panels that resolve the pressure jump at the edge, and the tip of a sharp body (see `_slid`)."""
         digits = -np.log10(self.accuracy)
+        # the error at the tip is the height of the profile within the innermost panel
         tip = max(round(2.0 * digits) + 1 - self.rougher, 3.3 * digits - 2.2 - self.rougher)
         edge = round(2.0 * digits) + 4 - self.rougher
         return graded_panels(round(sharpness * tip), edge, 4 - min(self.rougher, 2))
@@ -159,18 +152,15 @@ def exact(
 
 
 def operations(accuracy: float, *, constant_force: bool) -> float:
-    """Return the approximate number of operations of a solution in partial slip: n^3 for each time step with n nodes.
-
-    The steps first grow by the factor `GROWTH`, beginning with the error allowed in a step. Then this error limits the
-    steps, at third order. Under constant force, the evolution has two parts.
-    """
+    """Return the approximate number of operations in partial slip: n^3 for each time step with n nodes."""
     resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force else COARSEST))
+    # steps that grow by the factor `GROWTH`, and steps that are limited by an error of third order
     steps = float(np.log(1.0 / resolution.step) / np.log(GROWTH) + resolution.step**-0.25)
     return (2.0 if constant_force else 1.0) * steps * resolution.panels(5 if constant_force else 2).nodes.size ** 3
 
 
 class _Leg(NamedTuple):
-    """The part of an evolution with one `problem`; `before` is the energy dissipated earlier, divided by mu."""
+    """A part of an evolution, with one `problem`; `before` is the energy dissipated before this part, divided by mu."""
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
@@ -178,14 +168,10 @@ class _Leg(NamedTuple):
 
     @property
     def end(self) -> float:
-        """The time of the last moment."""
         return float(self.moments[-1].time)
 
     def at(self, time: float) -> tuple[Any, float, float]:
-        """Return the moment at a time, and two numbers.
-
-        They are the dissipated energy divided by mu, and a lower limit for the stated error of the contact radius.
-        """
+        """Return the moment at a time, the dissipated energy divided by mu, and a lower limit of the radius error."""
         number, moment = at(self.problem, self.moments, time)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
@@ -261,10 +247,9 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
 
 
 def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
-    """Return the radii that the stick border has passed, the depth at which it passed each radius, and a function.
+    """Return the radii that the stick border has passed, and the depth d1 (unit d0) at which it passed each radius.
 
-    The depths are in units of d0. From then on, the image at a radius is this depth minus eta. The function returns the
-    slope of the image at any position.
+    Also return the slope of the image, d1 - eta at these radii, as a function of position.
     """
     places, depths = rising(path)
     radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
@@ -285,8 +270,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, (radii, reached, frozen_slope) = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
-    # between c and b, g = d' - eta in int_0^b g dx, where d' is the depth at the time when the border passed this
-    # radius
+    # in int_0^b g dx, the image between c and b is g = d1 - eta (see `_frozen`)
     annulus = float(np.trapezoid((reached - 1.0) / eta - 1.0, radii))
     load = float(problem.load or 0.0)
     depth = 1.0 + eta * (load + annulus) / border
@@ -373,10 +357,8 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
 
 
 def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
-    """Return the contact after each wanted sliding path; all are taken from the same solution.
-
-    Near the axis, f ~ r^n = (r^2)^(n/2), so a body with n < 2 needs smaller panels there.
-    """
+    """Return the contact after each wanted sliding path; all are taken from the same solution."""
+    # near the axis, f ~ r^n = (r^2)^(n/2), so a body with n < 2 needs smaller panels there
     near, far = profile.image(np.array([1e-5, 2e-5]))
     sharpness = max(2.0 / float(np.log2(far / near)), 1.0) if near > 0.0 else 1.0
     problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
@@ -387,9 +369,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
 
 def _slid_contact(leg: _Leg, path: float) -> Worn:
-    """Return the worn contact after one sliding path, computed from the values at the nodes. Its image is NaN outside
-    the contact.
-    """
+    """Return the worn contact after one sliding path; outside the contact, its image is NaN."""
     problem, (moment, energy, edge_error) = leg.problem, leg.at(path)
     assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated

@@ -1,7 +1,7 @@
 """Wear under blocks of different amplitude, depth or force; every block is a new problem of partial or gross slip.
 
 The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
-grid is uniform, because each load block leaves a kink or a jump in the image at a new place, its own stick border.
+grid is uniform, because each load block leaves a kink or a jump in the image at another stick border.
 """
 
 from __future__ import annotations

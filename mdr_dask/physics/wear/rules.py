@@ -1,8 +1,8 @@
 """The fast rule of the thesis for wear at constant depth, and the limiting profile, for any body of revolution.
 
-In the fast rule (thesis eq. 6.11), y = (g - g0(c)) / eta with eta = 1 - g0(c) follows a logistic law up to x = 1.
-Beyond x = 1, g - 1 decays to the fraction exp(-xi N / a(c)) of g0 - 1. The logistic law depends on N through the same
-fraction. In the limiting profile (eqs. 6.8-6.10), this fraction is zero.
+In the fast rule (thesis eq. 6.11), the image g depends on the cycles through `rest` = exp(-xi N / a(c)). Up to x = 1,
+y = (g - g0(c)) / (1 - g0(c)) follows a logistic law. Beyond x = 1, g - 1 is the fraction `rest` of g0 - 1. In the
+limiting profile (eqs. 6.8-6.10), `rest` is zero.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from mdr_dask.physics.wear.worn import Scar, Worn, beyond_table, check_stick_rad
 
 LAYER_GROWTH = 30.0  # ratio of the widths of successive pieces of integration at the stick border
 SCAR = 1e-10  # tolerance, over eta, of the integral that vanishes at the radius of the scar
-ERROR = 2e-6  # numerical error of every output over its largest value, without the error of the fast rule itself
+ERROR = 2e-6  # numerical error of every output divided by its largest value, without the error of the fast rule itself
 EPS = float(np.finfo(np.float64).eps)
 _NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One case: virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), and `rest`, the remaining fraction."""
+    """One case: virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), and `rest` = exp(-xi N / a(c))."""
 
     image: Image
     c: float
@@ -84,7 +84,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
         between 0.9 and 1.
     """
     radius = limit_radius(profile, stick_radius)
-    rest = max(math.exp(-xi * cycles / radius), EPS)  # no layer at the stick border that is thinner than round-off
+    rest = max(math.exp(-xi * cycles / radius), EPS)  # a smaller value would be lost to rounding at the stick border
     return _worn(profile, _rule(profile, stick_radius, rest), radius, 1.0)
 
 
@@ -161,10 +161,7 @@ def _changes(rule: Rule, places: FloatArray) -> FloatArray:
 
 @jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
-    """Write the ends of the pieces of integration to `cuts`.
-
-    They are c, the radius at which y = 1/2, two larger radii, and 1.
-    """
+    """Write the ends of the pieces of integration to `cuts`: c, the radius with y = 1/2, two larger radii, and 1."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
     if rule.rest == 0.0:
         high = 0.0
@@ -220,7 +217,7 @@ def _scar_radius(
     """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is none.
 
     `low_value` and `high_value` are the values of the integral at `low` and `high`. The method is the false position as
-    improved by Anderson and Björck: if one end of the interval is kept in two successive steps, its value is reduced.
+    improved by Anderson and Björck.
     """
     if not high_value < 0.0 < low_value:
         return high
@@ -243,7 +240,7 @@ def _scar_radius(
 
 @jit
 def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
-    """Return a(c) for a rule whose remaining fraction is zero, or NaN if a(c) exceeds the largest radius."""
+    """Return a(c) for a rule with `rest` = 0, or NaN if a(c) exceeds the largest radius."""
     _put_cuts(rule, quadrature.cuts)
     low, high = 1.0, min(1.5, largest)
     low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)

@@ -21,7 +21,7 @@ from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, value
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 
-TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # of Newton's method, and step of its finite differences
+TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # tolerance and step of the finite differences of Newton's method
 #: Weight of the stick border in the error of a step, relative to the weight of the depth: f rises like a square root
 #: beyond the border.
 BORDER_WEIGHT = 30.0
@@ -68,7 +68,7 @@ class Place(NamedTuple):
 
 
 class Past(NamedTuple):
-    """Past moments, the newest first; `shares` are their weights in the BDF formula of one step.
+    """Past moments, the newest first; `shares` are the weights of the moments in the BDF formula of one step.
 
     `worn`, shape (moments, nodes), holds the worn depths while the stick border moves; `frozen` is then NaN. If the
     border no longer moves, `frozen` is the worn depth at the border, and `worn` holds (worn depth - frozen) / sqrt(z)
@@ -110,7 +110,7 @@ class PartialSlip:
     the border b stays at c. Under constant force, the border moves outwards until the image has a jump at the border.
 
     The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
-    Under constant force, the next unknown is the depth. As long as the border moves, the last unknown is the border.
+    Under constant force, the depth is a further unknown. As long as the border moves, the last unknown is the border.
     `load` is half of the force on the virgin slip zone, divided by eta; at constant depth, it is None. If the border
     does not move, `border` is the value of q at the border, and `frozen` is the worn depth there. If the border moves,
     `border` is None.
@@ -183,10 +183,9 @@ class PartialSlip:
         return still, replace(moment, unknowns=moment.unknowns[:-1])
 
     def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns that computes the contributions of the past moments to the residual.
+        """Return a function of the unknowns for the contributions of the past moments to the residual.
 
-        They are the contributions to s and to the worn depth at the nodes, and the increase of the load of the stick
-        zone.
+        The contributions are those to s and to the worn depth, and the increase of the load of the stick zone.
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
@@ -296,10 +295,7 @@ class PartialSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities whose error is controlled in every step.
-
-        They are s at the nodes and, under constant force, the depth and the position of a moving border.
-        """
+        """Return the quantities with controlled error: s and, under constant force, the depth and a moving border."""
         weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -414,15 +410,13 @@ def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
 
 @jit_inline
 def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
-    """Return the rise of f_star at q on a straight piece of the path; the depth rises by `change` along the piece.
-
-    The integrand is a smooth function of sqrt(r^2 - b^2).
-    """
+    """Return the rise of f_star at q on a straight piece of the path; the depth rises by `change` along the piece."""
     low, high = min(first, last), max(first, last)
     if low >= q:
         return 0.0
     if high > q:
         change *= (q - low) / (high - low)
+    # the integrand is a smooth function of sqrt(r^2 - b^2)
     scale = math.sqrt(body.width / (body.square + body.width * q))
     begin, end = math.sqrt(max(q - first, 0.0)), math.sqrt(max(q - last, 0.0))
     mean, weights = 0.0, 0.0

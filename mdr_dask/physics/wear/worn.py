@@ -21,7 +21,9 @@ from mdr_dask.physics.refine import SAFETY
 #: Outputs that are functions of position, and the attributes of `Worn` that compute them; other outputs are numbers.
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
-JUMP_WIDTH = 1e-9  # a change of the image within this distance from a border, over its radius, is a jump
+JUMP_WIDTH = (
+    1e-9  # a change of the image within this distance from a border, divided by the radius of the border, is a jump
+)
 #: The error of a function is the largest difference within this number of neighbours, because the difference of two
 #: functions vanishes where they intersect.
 REACH = 5
@@ -95,11 +97,8 @@ class Worn:
         return np.asarray(SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide)))
 
     def _distance(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the larger of two differences.
-
-        The first is the difference from the first coarser solution, the second is half of the difference from the
-        second coarser solution. Both are used, because two solutions may agree by chance.
-        """
+        """Return the difference from the first coarser solution, or half the difference from the second if larger."""
+        # two solutions may agree by chance
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) / (k + 1) for k, one in enumerate(self.rougher)]
@@ -240,8 +239,8 @@ def worn_by(
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
     """Return g - g0 outside a scar of radius a, where f = f0, so that the half-integral of the change vanishes.
 
-    This is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The substitutions are t = a
-    cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
+    The change is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The substitutions are
+    t = a cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
     """
     c, a = scar.border, scar.radius
     s = np.sqrt((position - a) * (position + a))

@@ -39,7 +39,7 @@ class Foundation(NamedTuple):
 def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
     """Return the foundation: `moduli` are G_m / G_inf, `times` the distinct tau_m, and `viscosity` is eta / G_inf.
 
-    The unit of time is arbitrary. For a Kelvin solid (no Prony terms) the viscosity is 1 if this unit is tau.
+    For a Kelvin solid (no Prony terms), the viscosity is 1 if the unit of time is tau.
     """
     g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if g.size == 0 and not viscosity > 0:
@@ -48,7 +48,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     g, tau = g[order], tau[order]
     pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
     zeros, distance = recovery_times(weight, pole)
-    # modes with u = 1 and a_m = -lambda / (tau_m - lambda); they are orthogonal if weighted with `weight`
+    # modes with u = 1 and a_m = -z / (tau_m - z), where z is the recovery time of the mode
     modes = -zeros / distance
     modes /= np.sqrt(weight @ modes**2)
     load = np.append(1.0, 0 * g) if viscosity > 0 else g / (1 + g.sum())
@@ -130,13 +130,11 @@ def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
 
 @jit
 def press(solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray) -> None:
-    """Move an element from u0 to u1 at constant speed; its `terms` are overwritten.
-
-    If a is the strain of the dashpot of a Prony term, u - a is then A + B exp(-t / tau), with A = tau du/dt.
-    """
+    """Move an element from u0 to u1 at constant speed; its `terms` are overwritten."""
     if step <= 0:
         return
     for m in range(solid.times.size):
+        # stretch of the spring of the term after a long time
         steady = (u1 - u0) / step * solid.times[m]
         terms[i, m] = u1 - (steady + ((u0 - terms[i, m]) - steady) * fades[m])
 
@@ -180,8 +178,8 @@ def free_after(
 ) -> float:
     """Return the displacement of an element at the end of a duration.
 
-    During the fraction `part` of the duration, the element is moved to the displacement `leaves`. Then it is free. Its
-    strains at the end are written to `lapse.strains`; `terms` is not changed.
+    The element is moved to the displacement `leaves` during the fraction `part` of the duration, and is then free.
+    The strains at the end are written to `lapse.strains`; `terms` is not changed.
     """
     strains, decay, fades = lapse.strains, lapse.part_decay, lapse.part_fades
     for m in range(solid.times.size):
@@ -212,8 +210,7 @@ def advance(
 
     The depth plus height of the line changes from w0 to w1; u0 and `touching` are displacement and contact at the
     start. `part` and `leaves` are results of :func:`release` for an element in contact. `after` is the displacement at
-    the end if the element is then free: either it has separated as described by `part` and `leaves`, or it was free all
-    the time.
+    the end for an element that separates or stays free.
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades

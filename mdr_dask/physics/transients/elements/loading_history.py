@@ -55,7 +55,7 @@ def untouched(elements: int, terms: int) -> State:
 
 
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
-    """Return state, depth and outcome of steady sliding of the elements at the nodes, at constant speed and load.
+    """Return the state of the elements at the nodes in steady sliding, the depth, and the outcome.
 
     One element is moved along the line in steps of half a cell, by the method of :func:`follow_line`, until its state
     repeats. The depth is found from the mean displacement, which increases with the depth. At ``deborah = 0`` the
@@ -123,10 +123,10 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
 def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State) -> tuple[bool, float]:
     """Move one element along the line at constant depth until its state repeats, and write the state of all elements.
 
-    If the line has k times as many nodes as there are elements, every k-th node belongs to an element. Return whether
-    the state repeats, and the displacement of the element at the end of the line.
+    Return whether the state repeats, and the displacement of the element at the end of the line.
     """
     n = line.height.size - 1
+    # every k-th node belongs to an element, with k = `every`
     every, step = n // state.displacement.size, 1 / (n * deborah)
     lapse, last = lapse_of(solid, step), np.zeros(solid.times.size)
     terms, free_terms = np.zeros((1, last.size)), np.zeros((1, last.size))
@@ -168,10 +168,10 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
     """Compute the motion of every element of a linear foundation under a line.
 
     During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
-    The load alone determines the mean displacement; it does not matter which elements are in contact. Therefore the
-    depth is the root of a convex function. If the line is not periodic, elements enter undeformed. Forces are
-    interpolated linearly between elements, which is most accurate for a line without kinks. `state` and `depth`
-    describe the first instant; they are not overwritten.
+    The mean displacement depends on the load, but not on which elements are in contact, so that the depth is the root
+    of a convex function. If the line is not periodic, elements enter undeformed. Forces are interpolated linearly
+    between elements, which is most accurate for a line without kinks. `state` and `depth` describe the first instant
+    and are not overwritten.
     """
     now, out = deepcopy(state), np.full((3, schedule.instants.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
@@ -231,7 +231,7 @@ class Piece:
         return np.inf if same else self.end - self.start
 
     def longest_step(self, nodes: int, per_decade: float) -> float:
-        """Return the longest time step, which depends on the travel of the line and on the changes of its motion."""
+        """Return the longest time step, which is limited by the travel of the line and by the changes of its motion."""
         fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
         most = CELLS / (nodes * fastest) if fastest else np.inf
         return min(most, PART * self.changes_in) / per_decade
@@ -287,8 +287,8 @@ def trace(
 ) -> Trace:
     """Compute the friction of a body during a history, from the motion of every element.
 
-    `before` contains velocity and load until t = 0. The body slides steadily until then, or is at rest if the velocity
-    is 0. Velocity and load may jump at t = 0. The pieces are in the order of time, and the end of the last one is
+    Until t = 0 the body slides steadily with the velocity and the load in `before`, or is at rest if the velocity is 0.
+    Velocity and load may jump at t = 0. The pieces are in the order of time, and the end of the last one is
     infinite. The requested times increase. `per_decade` is the number of steps per factor of ten in the time since the
     start of a piece.
     """

@@ -27,11 +27,10 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """The last known edges of contact, at most one in the cell before each element.
+    """The last known edges of contact at which the force is zero, at most one in the cell before each element.
 
-    The force is zero at such an edge, and one of the two elements of the cell is in contact. `place` is the distance
-    between the edge and the element in contact, in cells, or -1 if there is no edge. `gap` is the gap at the element
-    out of contact, at the instant at which the edge was found.
+    `place` is the distance between the edge and the element in contact, in cells, or -1 if there is no edge. `gap` is
+    the gap at the element out of contact, at the instant at which the edge was found.
     """
 
     place: FloatArray
@@ -105,7 +104,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, j: int) -> float:
-    """Return the mean of the cubic through the four nearest `values` over the cell before node j."""
+    """Return the mean over the cell before node j of the cubic through the four nearest `values`."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
@@ -155,10 +154,7 @@ def _cell(
 
 @jit
 def _forces(state: State, workspace: StepWorkspace, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return the mean load, the mean drag and the fraction of the line in contact; write the edges if `keep` is True.
-
-    The cell before the element `first` does not exist.
-    """
+    """Return mean load, mean drag and the fraction of the line in contact; write the edges if `keep` is True."""
     force, power, slope, gaps = workspace.force, workspace.power, workspace.slope, workspace.gaps
     n, touching, edges = force.size, state.touching, state.edges
     load, drag, length = 0.0, 0.0, 0.0
@@ -195,12 +191,11 @@ def _pressing_rate(state: State, workspace: StepWorkspace, weight: float, debora
 def _carrying_rate(
     state: State, workspace: StepWorkspace, weight: float, rate: float, drive: Drive
 ) -> tuple[float, float, float]:
-    """Find the rate of the depth at which the elements carry the load, and write the edges of contact.
+    """Return the `rate` at which the elements carry the load, the drag, and the fraction of the line in contact.
 
-    Return this rate, the drag and the fraction of the line in contact. The force of an element pressed to the line is
-    `pulls` plus `weight` times ``rate + deborah * slope``. With a dashpot, `weight` is the viscosity and `rate` the
-    rate of the depth. Without a dashpot, `weight` is the glass modulus, `rate` a correction of the depth, and `deborah`
-    0.
+    The force of an element pressed to the line is `pulls` plus `weight` times ``rate + deborah * slope``. With a
+    dashpot, `weight` is the viscosity and `rate` the rate of the depth. Without a dashpot, `weight` is the glass
+    modulus, `rate` a correction of the depth, and `deborah` 0. The edges of contact are written to `state`.
     """
     force, power, slope, pulls = workspace.force, workspace.power, workspace.slope, workspace.pulls
     drag, length = 0.0, 0.0
@@ -367,7 +362,6 @@ def _separate(
 def _move(
     solid: Foundation, state: State, workspace: StepWorkspace, lapse: Lapse, old_depth: float, depth: float
 ) -> None:
-    """Move all elements through a step."""
     u, touching, after = state.displacement, state.touching, workspace.after
     for j in range(workspace.under.size):
         was = touching[j]
@@ -402,8 +396,7 @@ def _step(
 ) -> tuple[float, bool]:
     """Move all elements through a step; return the depth at its end, and whether this depth was found.
 
-    At the end of the step the mean displacement is `mean`. The pair `deborah` contains v tau / L at the start and at
-    the end.
+    `mean` is the mean displacement at the end of the step. `deborah` contains v tau / L at the start and at the end.
     """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
@@ -426,9 +419,8 @@ def forces_now(
 ) -> tuple[float, float, float, float]:
     """Return the depth, the rate of the depth, the drag and the fraction of the line in contact.
 
-    The edges of contact are written to `state`. With a dashpot, the rate of the depth is changed until the elements
-    carry the load. Without a dashpot, the depth itself is changed until they do. The depth that follows from the mean
-    displacement is less accurate, because this mean is taken over the elements only.
+    The edges of contact are written to `state`. Until the elements carry the load, the rate of the depth is changed if
+    there is a dashpot, and otherwise the depth itself.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
