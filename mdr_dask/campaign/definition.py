@@ -1,4 +1,4 @@
-"""The data classes of a campaign. All values have been checked, and quantities are in SI units."""
+"""The data classes of a checked campaign, with all quantities in SI units."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
-#: Number of digits to which the values of a range are rounded. Rounding errors are in the last two digits of a double.
+#: Number of digits to which the values of a range are rounded, to remove rounding errors.
 _DIGITS = 14
-#: Two values of an axis count as equal if they agree in this number of digits, because two formulas for one value may
-#: differ in the last digits.
+#: Two values of an axis count as equal if they agree in this number of digits.
 SAME_DIGITS = 12
 #: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
 SOME = 64
@@ -31,10 +30,7 @@ class Spread:
     whole: bool
 
     def at(self, shares: Any) -> list[float]:
-        """Return the value at each fraction of the interval: 0 gives `low`, 1 gives `high`.
-
-        The values are rounded with `tidy`, so that powers of ten are exact.
-        """
+        """Return the value at each fraction of the interval: 0 gives `low`, 1 gives `high`."""
         if self.geometric:
             values = self.low * (self.high / self.low) ** shares
         else:
@@ -43,7 +39,7 @@ class Spread:
         return [tidy(value, self.whole) for value in values]
 
     def shares(self, values: Any) -> FloatArray:
-        """Return the position of each value as a fraction of the interval. This is the inverse of `at`."""
+        """Return the position of each value as a fraction of the interval (the inverse of `at`)."""
         numbers = np.asarray(values, dtype=np.float64)
         if self.geometric:
             found: FloatArray = np.log(numbers / self.low) / np.log(self.high / self.low)
@@ -53,10 +49,7 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Round a number to a whole number if `whole` is true, otherwise to 14 digits.
-
-    If `exact` is true and `whole` is false, the number is returned unchanged.
-    """
+    """Round a number: to a whole number if `whole` is true, not at all if `exact` is true, otherwise to 14 digits."""
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -79,7 +72,7 @@ class Axis:
     # SI unit, ``"1"`` for pure numbers. None if the values are names.
     unit: str | None
     long_name: str
-    # Rule by which an adaptive axis gets further values; None for any other axis.
+    # None if the axis is not adaptive.
     refinement: Refinement | None = None
 
     @property
@@ -107,7 +100,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted relative and absolute error; an error needs to meet only one of the two limits."""
+    """The largest accepted relative error and absolute error; an error may exceed one of them, but not both."""
 
     relative: float = 0.0
     absolute: float = 0.0
@@ -127,10 +120,7 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case.
-
-    After a first round of realisations, further rounds follow until every tolerance is met.
-    """
+    """The number of realisations of each case: a first round, and further rounds until every tolerance is met."""
 
     # Number of realisations in the first round, and largest number in all rounds together.
     at_least: int
@@ -161,12 +151,11 @@ class Campaign:
     accuracy: float | None
     # Path (relative to the working directory) or URL of the store.
     store: str
-    # Length of a chunk along each dimension for which the campaign file sets it. All other lengths are chosen
-    # automatically.
+    # Lengths of chunks that the campaign file sets, by dimension.
     blocks: Mapping[str, int]
     text: str
     source: str
-    # Questions about numbers without a unit, and notes that name the unused columns of a table of cases.
+    # Questions about numbers without a unit, and notes about unused columns of a table of cases.
     remarks: tuple[str, ...] = ()
     # Table of measured values of an output, for the fit ``calibration``.
     measured: DataFile | None = None

@@ -35,7 +35,6 @@ class Document:
     text: str
     # Mappings, lists, texts, numbers, truth values and None.
     data: Any = None
-    # All problems of the file that have been found.
     problems: Problems = field(default_factory=Problems)
     _nodes: dict[Path, Node] = field(default_factory=dict)
     _keys: dict[Path, Node] = field(default_factory=dict)
@@ -47,15 +46,15 @@ class Document:
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
 
     def key_place(self, path: Path) -> Place:
-        """Return the position of the key at a path. An entry of a list has no key; its own position is returned."""
+        """Return the position of the key at a path. For an entry of a list, return the position of the entry."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
 
     def report(self, path: Path, what: str, key: bool = False) -> None:
-        """Add a problem at a path. The problem belongs to the key if `key` is true, and to the value otherwise."""
+        """Add a problem of the value at a path or, if `key` is true, of the key at this path."""
         self.problems.add(self.key_place(path) if key else self.place(path), dotted(path), what)
 
     def flow(self, path: Path) -> str:
-        """Return the value at a path as YAML on one line. Numbers and texts are written as in the file."""
+        """Return the value at a path as YAML on one line, with numbers and texts as in the file."""
         return _flow(self._nodes[path])
 
     def _at(self, node: Node) -> Place:
@@ -73,7 +72,7 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Parse a YAML 1.2 text. Messages call this text `source`, for example the name of its file."""
+    """Parse a YAML 1.2 text. `source` is the name of the text in messages, for example the name of a file."""
     document = Document(source, text)
     problems = document.problems
     if len(text) > _LONGEST:
@@ -127,7 +126,6 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last two lines differ in indentation although the first of them does not end with a colon."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -140,8 +138,6 @@ class _EndlessError(Exception):
 
 
 class _Reader:
-    """Reads the data of a document node by node."""
-
     def __init__(self, document: Document) -> None:
         self.document = document
         self.problems = document.problems

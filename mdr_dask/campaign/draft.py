@@ -42,11 +42,7 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 
 
 def draft(name: str, model: Model[Any], file: str) -> str:
-    """Return the text of a campaign. The text passes every check if the model needs no data file.
-
-    `name` is the name of the model in a campaign. `file` is the name of the campaign file, which appears in the
-    comments.
-    """
+    """Return the text of a campaign file. It passes every check if the model needs no data file."""
     short = name.partition(":")[2].lower() if ":" in name else name
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
     head = _HEAD.format(summary=summary, file=file, name=short, model=name)
@@ -97,10 +93,7 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return examples of the value of a field, each as text.
-
-    If the field accepts parameter sets, each set has one example, or one for each of its alternatives.
-    """
+    """Return examples of the value of a field as texts, at least one for each parameter set that the field accepts."""
     info = parameters.model_fields[name]
     kinds = list(fields.structures(info))
     if inner:
@@ -112,7 +105,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return one example of a parameter set, or an example for each alternative in its first group of alternatives."""
+    """Return an example of a parameter set for each alternative in its first group of alternatives."""
     group = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]
@@ -146,7 +139,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return a number within the bounds of a field. It is 1 if the bounds allow 1."""
+    """Return a number within the bounds of a field: 1 if possible."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

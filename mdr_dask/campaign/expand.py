@@ -33,10 +33,9 @@ def expand(
     directory: str,
     outputs: Sequence[str],
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series that have no problems, and the questions and remarks for the user.
+    """Return the series without problems, and remarks for the user; add the problems of other series to the document.
 
-    Problems of the other series are added to the document. Names of files are relative to `directory`. `outputs` are
-    the names of the requested outputs.
+    Names of files are relative to `directory`.
     """
     found = []
     asked: dict[str, None] = {}
@@ -88,10 +87,7 @@ class _Expansion:
     def _require_places(
         self, base: Parameters, axis: Axis, origin: Origin, model: Model[Any], outputs: Sequence[str]
     ) -> None:
-        """Report a problem if an axis changes the coordinates of an output.
-
-        The coordinates must be the same in all cases, because all cases of an output are stored in one array.
-        """
+        """Report a problem if the coordinates of an output are not the same for all values of an axis."""
         wanted = [model.output(name) for name in outputs]
         if not any(output.dims for output in wanted):
             return
@@ -153,13 +149,10 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the checked values of one axis, or None if one of these values is wrong.
-
-        Each value is checked together with the first values of all other axes.
-        """
+        """Check each value of one axis with the first values of all other axes; return None if a value is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        # the problems of the other axes are reported when their own values are checked
+        # the problems of another axis are reported when the values of that axis are checked
         elsewhere = broken | {other.path for other in variations if other is not one}
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         independent = fields.is_independent(self.parameters, one.path, self.data)
@@ -255,7 +248,6 @@ class _Expansion:
     def _refined(
         self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
     ) -> Iterator[Axis]:
-        """Yield all axes. Each adaptive axis gets the rule by which its further values are chosen."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
                 found = refinement(self.document, one.written, one.spread, model, outputs)

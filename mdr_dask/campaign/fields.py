@@ -1,4 +1,4 @@
-"""The fields of parameter sets, which are keys of a campaign file: their types, units and nested parameter sets."""
+"""Types, units and nested parameter sets of the fields of parameter sets. The fields are keys of a campaign file."""
 
 from __future__ import annotations
 
@@ -64,8 +64,7 @@ def listed(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, return the set that contains most keys of the mapping. If this does not decide, return the set
-    for which most keys of the mapping resemble the name of a field.
+    If several sets fit, return the set whose names of fields are most similar to the keys of the mapping.
     """
     if not isinstance(value, dict):
         return None
@@ -78,7 +77,7 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
 
 
 def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
-    """Return how many keys of a mapping are fields of a parameter set, and how many resemble the name of a field."""
+    """Return how many keys of a mapping are names of fields of a parameter set, and how many resemble such a name."""
     keys = [str(key) for key in value]
     return (
         sum(key in kind.model_fields for key in keys),
@@ -87,7 +86,7 @@ def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the fields of a parameter set that have only one possible value, each with this value."""
+    """Return the fields of a parameter set that have only one possible value, with this value."""
     return {
         key: get_args(info.annotation)[0]
         for key, info in kind.model_fields.items()

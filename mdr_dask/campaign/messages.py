@@ -16,8 +16,8 @@ from mdr_dask.errors import did_you_mean, similar
 from mdr_dask.models.data_file import DataFile, NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Function that adds a problem. Its arguments are the path in the data, the message, and a truth value: true if the key
-#: at this path is wrong, false if its value is wrong.
+#: Function that adds a problem. Its arguments are the path in the data, the message, and whether the key is wrong (or
+#: else the value).
 Report = Callable[[Path, str, bool], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
@@ -44,16 +44,13 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
-        if inside and group[0]["type"] == "too_short":  # each missing entry has a message of its own
+        if inside and group[0]["type"] == "too_short":  # another message names each missing entry
             continue
         _report_group(path, group, kind, data, report)
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path in the data to the value with an error.
-
-    The ``loc`` of pydantic also contains the name of each possible type of a value; these names are left out.
-    """
+    """Return the path in the data to the value with an error: the ``loc`` of pydantic without the names of types."""
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -68,10 +65,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error comes from a parameter set that the user did not mean.
-
-    The keys of the value show which of the possible parameter sets the user meant.
-    """
+    """Return whether an error comes from a parameter set other than the one that the keys of the value suggest."""
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -112,7 +106,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """If a message quotes an entry of a list, return the path from the list to this entry, otherwise an empty path."""
+    """Return the path from a list to the entry that a message quotes; empty if the message quotes no entry."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 
@@ -142,7 +136,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """If a word was given instead of a mapping or a list, return a hint that shows how to write the mapping or list."""
+    """Return a hint for a word in place of a mapping or a list: how to write the mapping or list."""
     value, info = value_at(data, path), fields.field_at(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -223,7 +217,7 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Describe the quantity that a field expects, with a usual value. The text is empty for a field without a unit."""
+    """Describe the quantity that a field expects, with a usual value; empty for a field without a unit."""
     info, unit = fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     return expected(unit, "".join(fields.usual(info)[:1])) if info and unit else ""
 

@@ -25,7 +25,7 @@ class Place:
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """A problem: its position, the key to which it belongs, and the message."""
+    """A problem: its position in the file, its key, and the message."""
 
     place: Place
     where: str
@@ -53,10 +53,7 @@ class Problems:
         self._found.setdefault((place, where), Problem(place, where, what))
 
     def raise_if_any(self, questions: Iterable[str] = ()) -> None:
-        """Raise one `CampaignError` if there are problems.
-
-        Its messages are the problems, sorted by file and line, followed by the questions.
-        """
+        """If there are problems, raise a `CampaignError` with all problems by file and line, and then the questions."""
         if self._found:
             sources = list(dict.fromkeys(place.source for place, _ in self._found))
             ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))

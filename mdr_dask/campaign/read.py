@@ -75,7 +75,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys and the names of the wrong keys. A wrong key gets its default value or a placeholder."""
+    """Return the checked keys, with a default or a placeholder for wrong keys, and the names of the wrong keys."""
     wrong: set[str] = set()
 
     def report(path: Path, what: str, key: bool) -> None:
@@ -101,11 +101,7 @@ def _model(document: Document, spec: CampaignSpec) -> Model[Any] | None:
 
 
 def with_hint(error: ModelError, name: str) -> str:
-    """Return the message about a model that cannot be loaded.
-
-    The message ends with a hint: the known model with the nearest name, or the page of the documentation about models
-    that users write.
-    """
+    """Return a message with a hint: the known model with the nearest name, or the documentation of own models."""
     is_unknown = str(error).startswith("unknown")
     return f"{error}{did_you_mean(name, models.names()) if is_unknown else ' (see docs/own-model.md)'}"
 

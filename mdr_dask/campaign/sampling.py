@@ -24,10 +24,7 @@ _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brack
 
 
 def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
-    """Return the varied parameters with one value for each point of the design, drawn from their intervals.
-
-    The same `seed` gives the same values. A longer Sobol sequence begins with the points of a shorter one.
-    """
+    """Return the varied parameters with one value for each point of the design, drawn from their intervals."""
     import numpy as np
     from scipy.stats import qmc
 
@@ -48,10 +45,9 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the points of a Saltelli design from pairs of points: a in `first` and b in `second`.
+    """Return the points of a Saltelli design from pairs of points: a in `first`, b in `second`, shape (points, inputs).
 
-    Each pair gives a, b, and one point for every input: a copy of a in which this input has the value that it has in b.
-    All arrays have the shape (points, inputs).
+    Each pair gives a, b, and for every input a copy of a in which the value of this input comes from b.
     """
     import numpy as np
 
@@ -74,9 +70,8 @@ def tabled(
 ) -> tuple[Variation, ...] | None:
     """Read the varied parameters from a CSV file: each column is a parameter, and each line is a case.
 
-    The file `name` is relative to `directory`; `origin` is the position of this name in the campaign. `data` contains
-    the parameters that the campaign file itself gives. If the table is wrong, its problems are added to `problems`, and
-    the result is None. The names of ignored columns are added to `remarks`.
+    `origin` is the position of the file name in the campaign, and `data` contains the parameters outside the table. If
+    the table is wrong, add its problems to `problems` and return None. Add the names of ignored columns to `remarks`.
     """
     path = Path(directory, name)
     try:
@@ -111,7 +106,7 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is ignored. A column of numbers is not ignored if its heading resembles a parameter."""
+    """Return whether a column is ignored: it is not if it has numbers and its heading resembles a parameter."""
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

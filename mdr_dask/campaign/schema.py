@@ -1,4 +1,4 @@
-"""The JSON schema of the campaign file, for editors; made from the keys and the parameter sets of the models."""
+"""The JSON schema of the campaign file, for editors."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Schema = dict[str, Any]
 
 #: Name of a model that the user wrote, ``package.module:NAME``.
 _OWN_MODEL = r"^[A-Za-z_][\w.]*:[A-Za-z_][\w.]*$"
-#: Schema of a quantity with a unit: a text that begins like a number. The unit is checked when the file is read.
+#: Schema of a quantity with a unit: a text that begins like a number. The schema does not check the unit.
 _QUANTITY = {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)", "description": "a number with its unit"}
 _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 
 
 def json_schema() -> Schema:
-    """Return the JSON schema (draft 2020-12) of campaign files of all models. It does not check units."""
+    """Return the JSON schema (draft 2020-12) of campaign files of all models."""
     root = _readable(CampaignSpec.model_json_schema())
     definitions = {**root.pop("$defs"), **_ranges()}
     choices = []
@@ -38,7 +38,7 @@ def json_schema() -> Schema:
 
 
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
-    """Return the schema of the key ``parameters`` for a model. Each parameter is a value, a list or a range.
+    """Return the schema of the key ``parameters`` for a model.
 
     `references` is the form of a reference to a nested parameter set; ``{model}`` stands for the name of the set.
     """

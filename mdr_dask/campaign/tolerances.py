@@ -26,7 +26,7 @@ def tolerances(
     model: Model[Any],
     outputs: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """Return the tolerance of each output in SI. Unknown names and wrong tolerances below `path` are reported."""
+    """Return the tolerance of each output in SI, and report unknown names and wrong tolerances."""
     known = [output.name for output in model.outputs if output.name in outputs]
     found = {}
     for name, written in given.items():
@@ -42,10 +42,7 @@ def tolerances(
 
 
 def is_of_fit(name: str, model: Model[Any]) -> bool:
-    """Return whether a name means a fitted constant, such as ``zone_one.alpha``.
-
-    A name that resembles an output is taken as a misspelt output.
-    """
+    """Return whether a name means a fitted constant, such as ``zone_one.alpha``, and not a misspelt output."""
     return not similar(name, [output.name for output in model.outputs])
 
 

@@ -26,10 +26,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The place where a value is written, for messages: its key, its position in the file, and its path.
-
-    The path is None if the value is written in a table.
-    """
+    """Where a value is written: its key, its position in the file, and its path (None if it is written in a table)."""
 
     name: str
     place: Place
@@ -39,7 +36,7 @@ class Origin:
 class Item(NamedTuple):
     """One value of a varied parameter: as written in the file, or in SI if it was computed from a range.
 
-    `inner` is true for a value that was computed from a range and is neither the smallest nor the largest.
+    `inner` is true for the values of a range between the smallest and the largest.
     """
 
     value: Any
@@ -57,7 +54,7 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    An adaptive axis has both values and an interval, and `written` is its path in the document.
+    Only an adaptive axis has values, an interval, and its path in the document, `written`.
     """
 
     path: tuple[str, ...]
@@ -67,7 +64,7 @@ class Variation:
     written: Path = ()
 
     def drawn(self, shares: Any) -> Variation:
-        """Return this variation with new values, which lie at the given fractions (0 to 1) of its interval."""
+        """Return this variation with values at the given fractions (0 to 1) of its interval."""
         assert self.spread is not None
         values = self.spread.at(shares)
         ends = values.index(min(values)), values.index(max(values))
@@ -84,9 +81,8 @@ def find(
 ) -> tuple[Variation, ...]:
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
-    For each parameter in `data`, `paths` contains its path in the document. If `drawn` is true, values are drawn from
-    the ranges, and a range does not state a number of values. A parameter whose list or range is wrong is returned
-    without values.
+    `paths` contains the path of each parameter in the document. If `drawn` is true, a range does not state a number of
+    values. A parameter whose list or range is wrong is returned without values.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
@@ -190,7 +186,7 @@ class _Search:
     def _items(self, spread: Spread, content: list[Any], at: Path) -> list[Item]:
         name, count = at[:-1], content[2]
         if isinstance(count, str) and count.isascii() and count.isdigit():
-            count = int(count)  # numbers may be written in quotes
+            count = int(count)  # the file may contain "5" instead of 5
         if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
             self._complain(
                 (*at, 2),
@@ -235,10 +231,7 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return at most `count` values of an interval, including its exact ends.
-
-    If several values are rounded to the same whole number, this number appears only once.
-    """
+    """Return at most `count` different values of an interval, including its exact ends."""
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
     ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
     return list(dict.fromkeys([ends[0], *inner, ends[1]]))

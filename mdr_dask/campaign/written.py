@@ -18,9 +18,9 @@ from mdr_dask.units import is_doubtful, likely, unit_behind
 
 @lru_cache(maxsize=16)
 def written_units(text: str) -> dict[str, str]:
-    """Return the unit of each parameter for which the campaign uses one unit only. The keys are names of coordinates.
+    """Return the unit of each parameter for which the campaign uses one unit only.
 
-    For example, the key of ``indenter.radius`` is ``indenter_radius``. If the text cannot be read, the result is empty.
+    The keys are names of coordinates, such as ``indenter_radius``. If the text cannot be read, the result is empty.
     """
     whole = parse(text, "").data
     data = whole if isinstance(whole, dict) else {}
@@ -42,8 +42,8 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter with a number that has no unit and is perhaps not meant in SI.
 
-    For each parameter in `data`, `paths` contains its path in the document. `units` maps the dotted name of a parameter
-    to its unit if this is not the unit that the model declares.
+    `paths` contains the path of each parameter in the document. `units` contains the units of parameters, by dotted
+    name, that differ from the units that the model declares.
     """
     asked: set[Path] = set()
     for name, given in data.items():
@@ -68,10 +68,7 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """For every number and text, yield the path of its parameter, its own path, and its value.
-
-    The entries of a list and the ends of a range belong to the parameter that has this list or range.
-    """
+    """For every number and text, even inside lists, yield the path of its parameter, its own path and its value."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if key in RANGES and isinstance(inner, list):
