@@ -40,7 +40,7 @@ class Commands(click.Group):
     """A group whose help lists its commands by purpose."""
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands of each group, each with one line of help, and then the names of all other commands."""
+        """Write each command of a group with one line of help, and then the names of all other commands."""
         limit = formatter.width - 20
         for title, names in GROUPS.items():
             with formatter.section(title):
@@ -120,7 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
         say("interrupted; finished results are kept; the same command computes the others", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages about cancelled tasks of Zarr
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages that tasks of Zarr were cancelled
         say(str(error), err=True)
         return 2
     except OSError as error:
@@ -134,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace missing standard streams. Characters that the encoding of a stream lacks become ASCII escapes."""
+    """Replace missing standard streams; write characters that the encoding of a stream lacks as ASCII escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # the stream was closed by a service manager, or by `>&-` in a shell

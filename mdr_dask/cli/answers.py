@@ -60,10 +60,7 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise an error if a table cannot be written to a path.
-
-    Possible reasons: the suffix is unknown, the path is the store of a study, or pyarrow is missing.
-    """
+    """Raise an error if the suffix of a path is unknown, if a store is at this path, or if pyarrow is missing."""
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)
@@ -108,7 +105,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors (``0.1234 +- 0.0005``) or its interval (``0.1234 (0.1220, 0.1240)``).
 
-    An error is left out if it is unknown or zero in all rows. The returned text names the errors that are printed.
+    Errors that are unknown or zero in all rows are left out. Also return a text that names the other errors.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}
@@ -134,7 +131,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return a text that names the printed errors: once for all outputs if possible, otherwise for each output."""
+    """Return a text that names the printed errors, once for all outputs or else for each output."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""
@@ -171,14 +168,12 @@ def _write_text(answer: Table, form: str, stream: TextIO) -> None:
 
 
 def _frame(answer: Table) -> pd.DataFrame:
-    """Return an empty frame with the columns of an answer."""
     import pandas as pd
 
     return pd.DataFrame(columns=list(answer.units))
 
 
 def _json_lines(frame: pd.DataFrame) -> Iterator[str]:
-    """Yield every row as a JSON object."""
     template = "{" + ", ".join(json.dumps(str(name)).replace("%", "%%") + ": %s" for name in frame) + "}"
     return (template % values for values in zip(*(_json_texts(frame[name].tolist()) for name in frame), strict=True))
 

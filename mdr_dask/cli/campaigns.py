@@ -59,7 +59,7 @@ def models(name: str | None, form: str | None) -> None:
 
 
 def _indented(path: str) -> str:
-    """Return the last part of a dotted name, indented by two spaces for each earlier part."""
+    """Return the last part of a dotted name, with two spaces before it for each other part."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 
@@ -72,10 +72,7 @@ def _parameter(row: dict[str, str]) -> str:
 
 
 def _output(row: dict[str, str]) -> str:
-    """Return the meaning, unit and dimensions of an output.
-
-    The text also states whether the output is computed only on request, and whether it has an error.
-    """
+    """Return the meaning, unit and dimensions of an output, and whether it needs a request and has an error."""
     along = row["dimensions"] and f"along {row['dimensions']}"
     missing = "" if row["default"] == "yes" else "only if requested"
     return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))

@@ -27,7 +27,7 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures. Its command line is written into the tables of the figures."""
+    """A command that draws figures and writes its own command line into their tables."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Keep the command line as it was typed, then parse it."""
@@ -135,7 +135,7 @@ def plot(
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return the warnings of finished results, without their details; equal warnings appear once."""
+    """Return each different warning of the finished results once, without details."""
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
@@ -169,7 +169,6 @@ def _known_to_all(urls: Sequence[str], groups: Mapping[str, xr.Dataset]) -> dict
 
 
 def _list(known: Mapping[str, Plot], groups: Mapping[str, xr.Dataset]) -> None:
-    """Print the figures, the outputs and the axes of a study."""
     from mdr_dask.plots.view import varied
 
     print_named([(name, figure.summary) for name, figure in known.items()])
@@ -231,10 +230,7 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store by their names in legends.
-
-    If several stores are drawn, each name begins with the name of the store.
-    """
+    """Return the groups of a store by their names in legends; with several stores, each name includes the store."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -248,7 +244,7 @@ def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, x
 
 
 def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:
-    """Draw a single figure, write it and its table to files, and print notes that the picture does not show."""
+    """Draw a figure, write it and its table to files, and print the notes on the figure."""
     from mdr_dask.plots import page
 
     with page.drawing_for(page.requested(**look)):
@@ -270,14 +266,14 @@ def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[st
 
 
 def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
-    """Print each note once, after the names of the figures to which the note applies."""
+    """Print each note once, after the names of its figures."""
     for note in dict.fromkeys(chain.from_iterable(notes.values())):
         about = [name for name, own in notes.items() if note in own]
         tell(f"{'all figures' if len(about) == len(notes) > 1 else ', '.join(about)}: {note}")
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:
-    """Return the path of each figure. A single figure may have any path; several figures are written to a folder."""
+    """Return the path of each figure: any path for a single figure, paths in one folder for several figures."""
     folder = output or Path("figures")
     if alone and folder.suffix and not folder.is_dir():
         require_suffix(folder, FIGURES)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     """Yield the function that writes the events of a run to the file `log`, and their messages to stderr.
 
-    `about` contains facts about the run for the first line of the log.
+    The first line of the log contains `about`.
     """
     lock = threading.Lock()
     if log is not None:

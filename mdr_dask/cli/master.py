@@ -144,7 +144,6 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
 
 
 def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
-    """Return the rows of a table that have the selected values."""
     import numpy as np
     import xarray as xr
 
@@ -192,7 +191,7 @@ def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
         by = str(curve.attrs["group"])
-        if form == "csv" and is_temperature(by, curve[by].attrs.get("units", "")):  # as `shift_factors` reads it
+        if form == "csv" and is_temperature(by, curve[by].attrs.get("units", "")):  # `shift_factors` reads this column
             shown[0] = shown[0].assign({"log10 a_T": sign_of(str(curve.attrs["abscissa"])) * curve["shift_factor"]})
     attrs = ("abscissa", "ordinate", "companion", "group")
     own = {f"{part.removesuffix('s')}_{key}": str(curve.attrs[key]) for key in attrs if curve.attrs.get(key)}

@@ -84,10 +84,9 @@ def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def figure_options(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add an option for the file of a figure, and the options for the look of the figure.
+    """Add options for the file of a figure (with `names` such as ``--plot``) and for its look.
 
-    `names` are the names of the option for the file, such as ``--plot``. The command gets the arguments `figure` and
-    `look`.
+    The command gets the arguments `figure` and `look`.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 #: The error of a mean counts as a rounding error if it is below this fraction of the mean.
 ROUNDING = 1e-13
-#: `GAP`: number of spaces between two columns of a table. `NARROWEST`: tables are formatted for at least this width, in
-#: characters, even if the terminal is narrower.
+#: `GAP`: number of spaces between two columns of a table. `NARROWEST`: least width of a table, in characters.
 GAP, NARROWEST = 2, 40
-#: A long text in the last column is wrapped to at least this width, in characters.
+#: Least width, in characters, to which a text in the last column is wrapped.
 WRAPPED = 30
 #: Numbers below `_SMALL` or above `_LARGE` are printed with a power of ten.
 _SMALL, _LARGE = 1e-4, 1e6
@@ -55,10 +54,7 @@ def _filled(line: str) -> str:
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
-    """Print rows as an aligned ``table``, as ``csv``, or as one ``json`` document with units.
-
-    All rows have the same keys.
-    """
+    """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units."""
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
         return
@@ -82,10 +78,9 @@ def titled(name: str, unit: str) -> str:
 
 
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
-    """Print columns side by side. A table that is too wide is printed in parts that repeat the first `keys` columns.
+    """Print columns side by side: a wide table in parts that repeat the first `keys` columns, a wide row as a list.
 
-    Columns with the same value in all rows, and columns without values, are named above the table, after the text
-    `note`. A single row that is too wide is printed as a list.
+    Columns with the same value in all rows, and columns without values, are named in a line that begins with `note`.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]
@@ -124,7 +119,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
 
 
 def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
-    """Return the columns of each part of a table that is too wide. Every part begins with the key columns."""
+    """Return the columns of each part of a table that is too wide; every part begins with the key columns."""
     first, rest = list(range(keys)), list(range(keys, len(widths)))
     parts, part = [], list(first)
     for column in rest:
@@ -137,7 +132,6 @@ def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
 
 
 def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]], widths: Sequence[int]) -> None:
-    """Print headings and cells; a long text in the last column is wrapped."""
     left = [_is_text(column) for column in cells]
     height = max(map(len, heads))
     lines = [[*[""] * (height - len(head)), *head] for head in heads]
@@ -151,12 +145,11 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
 
 
 def _is_text(column: Sequence[str]) -> bool:
-    """Return whether a column contains words; such a column is aligned to the left."""
     return any(re.search(r"[a-df-zA-Z]{2}", cell) for cell in column)
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts. If they need several lines, all lines of the second text begin in the same column."""
+    """Join two texts; if the result is wrapped, all lines of the second text begin in the same column."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -193,7 +186,7 @@ def _unit(title: str) -> str:
 
 
 def print_left(count: int | None) -> None:
-    """Print on stderr how many rows a limit left out; `count` is None if the number of these rows is unknown."""
+    """Print on stderr how many rows a limit left out (`count`, None if unknown)."""
     if count != 0:
         click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 
@@ -243,7 +236,7 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors. An unknown error is printed as ``?``, and a rounding error as 0."""
+    """Join a mean and its errors; an unknown error becomes ``?``, and a rounding error becomes 0."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
     shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]
@@ -255,7 +248,7 @@ def _error(error: float, size: float) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Return a number with `digits` digits, and with a power of ten only if it is very small or very large."""
+    """Return a number with `digits` digits, and with a power of ten if it is very small or very large."""
     text = f"{value:.{digits}g}"
     if "e" in text and _SMALL <= abs(float(text)) < _LARGE:
         return f"{float(text):.0f}"
@@ -263,7 +256,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def short(value: Any) -> str:
-    """Return a value as a cell of a table. An unknown value becomes ``-``."""
+    """Return a value as the text of a cell, ``-`` if it is unknown."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return UNKNOWN
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")

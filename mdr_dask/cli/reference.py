@@ -28,7 +28,7 @@ def commands_page() -> str:
 
 
 def _text(help_text: str) -> list[str]:
-    """Turn the help text of click into Markdown. Paragraphs that click does not wrap become blocks of code."""
+    """Turn a help text into Markdown; paragraphs that click does not wrap become blocks of code."""
     lines: list[str] = []
     for paragraph in help_text.split("\n\n"):
         kept = paragraph.strip().startswith("\b")

@@ -23,7 +23,7 @@ class Reading(click.Command):
     """A command whose first argument is a store."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command; if a chunk of the store cannot be read, raise an error that states this in one sentence."""
+        """Run the command; raise an error of one sentence if a chunk of the store cannot be read."""
         from mdr_dask.store import readable
 
         with readable(context.params[str(self.params[0].name)]):
@@ -141,7 +141,6 @@ def _answer(
     limit: int,
     **parts: Any,
 ) -> None:
-    """Print the answer to a question, or write it to a file."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
     from mdr_dask.questions.labelled import labelled

@@ -112,7 +112,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return which results are counted, such as ``first round``; the text is empty if all results are counted."""
+    """Return which results are counted, such as ``first round``, or an empty text if all are counted."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)
@@ -183,6 +183,6 @@ def _print_failed(url: str, progress: Progress) -> None:
 
 
 def _shared(progress: Progress) -> str:
-    """Return a text with the fraction of results that used the solution of another result, or an empty text."""
+    """Return a text with the fraction of results that share the solution of another result; empty if none does."""
     share = 1 - progress.solves / max(progress.done, 1)
     return f" ({share:.1%} of the results needed no solve of their own)" if progress.solves and share > 0 else ""

@@ -97,7 +97,6 @@ def surface(
 
 
 def _read(files: tuple[str, ...], kind: str | None, options: dict[str, Any]) -> Surface:
-    """Return the surface that the files and the options describe."""
     from pydantic import ValidationError
 
     from mdr_dask.errors import DataError
@@ -118,7 +117,7 @@ def _read(files: tuple[str, ...], kind: str | None, options: dict[str, Any]) -> 
 
 
 def _as_options(message: str) -> str:
-    """In a message, replace the names of parameters of a campaign by the options of this command."""
+    """Replace the names of parameters in a message by the options of this command."""
     message = re.sub(r"`(map|scan|spectrum)` instead of `\w+`", r"--as \1", message)
     names = "|".join(option.name or "" for option in surface.params)
     return re.sub(rf"`({names})(?:: (\w+))?`", lambda m: " ".join(filter(None, (_option(m[1]), m[2]))), message)
@@ -129,11 +128,7 @@ def _option(name: str) -> str:
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return the kind of a file: a spectrum, a map or a scan.
-
-    The names of the columns show whether a file is a spectrum. A file is a map if it has two dimensions, or if an
-    option is given that applies only to maps.
-    """
+    """Return the kind of a file: a spectrum (by its columns), a map (by its shape or the options), or a scan."""
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
     from mdr_dask.models.parts.surface_files import is_spectrum
@@ -159,7 +154,6 @@ def _write(read: Surface, path: Path) -> None:
 
 
 def _method(read: Surface) -> str:
-    """Return a description of how the spectrum was computed."""
     if read.map is not None:
         window = "Hann's window of the distance from the middle" if read.map.window == "hann" else "no window"
         return f"{read.map.detrend} subtracted, {window}, C2D in rings of the wave vector"

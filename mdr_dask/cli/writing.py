@@ -18,7 +18,7 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a new file. If writing fails, remove file and folder, and name the file in the error."""
+    """Make the folder of a new file; if writing fails, remove both and name the file in the error."""
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]
@@ -38,7 +38,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def require_outside(path: Path) -> None:
-    """Raise UsageError for a file inside a store; a store with such a file would count as damaged."""
+    """Raise UsageError for a file inside a store, because an additional file counts as damage."""
     groups = [folder for folder in path.absolute().parents if (folder / "zarr.json").is_file()]
     if groups:
         from mdr_dask.store import is_study  # imported here, because this module imports Zarr
@@ -48,7 +48,7 @@ def require_outside(path: Path) -> None:
 
 
 def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:
-    """Raise UsageError for a file whose suffix is not among the known ones."""
+    """Raise UsageError for a file with an unknown suffix."""
     if path is not None and path.suffix not in known:
         raise click.UsageError(
             f"expected a file that ends in {', '.join(known[:-1])} or {known[-1]}, got {str(path)!r}"
