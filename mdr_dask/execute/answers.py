@@ -17,8 +17,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
 
-#: Smallest number of realisations from which the interval of a fitted constant is computed: from fewer realisations,
-#: the bootstrap underestimates the scatter.
+#: Least number of realisations for the interval of a fitted constant: with fewer, the bootstrap underestimates scatter.
 FEWEST = 10
 
 
@@ -27,12 +26,11 @@ def cases_that_narrow(
 ) -> list[BoolArray]:
     """Return the cases that need more realisations, because they affect a constant whose interval is too wide.
 
-    As long as every case has fewer than `FEWEST` realisations, all cases that are new in this stage need more. `places`
-    are the positions that the cases of the stage have in the store. `taken` contains, for each case, the number of
-    realisations from which the constants are computed.
+    `places` are the positions of the cases of the stage in the store, and `taken` is the number of realisations of each
+    case from which the constants are computed.
     """
     answers = stage.campaign.replication.answers
-    if max(int(each.max()) for each in taken) < FEWEST:
+    if max(int(each.max()) for each in taken) < FEWEST:  # no interval can be computed yet
         return cases_of(stage, layout, places, stage.new)
     groups = _groups(url, stage, layout, taken)
     known = fits.available(stage.campaign.model)
@@ -43,7 +41,7 @@ def cases_that_narrow(
         try:
             wide = still_wide(fit, constant, groups, tolerance, stage.campaign.replication.at_most)
         except FitError:
-            continue  # at the end of the run, `unanswered` reports this error
+            continue  # `unanswered` reports this error at the end of the run
         for result, flags in wide.items():
             for name in [result] if fit.apart else groups:
                 if bool(flags.any()):
@@ -53,7 +51,7 @@ def cases_that_narrow(
 
 
 def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
-    """Yield sentences about the fitted constants that do not meet their tolerances."""
+    """Yield a sentence about each fitted constant that does not meet its tolerance."""
     answers = stage.campaign.replication.answers
     groups = _groups(url, stage, layout, taken)
     known = fits.available(stage.campaign.model)
@@ -78,13 +76,11 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the results of every series. If `taken` is 10 for a case, realisations 11, 12, ... of this case become
-    NaN. Failed realisations become NaN, too.
-    """
+    """Return the results of every series, with NaN for failed realisations and for realisations beyond `taken`."""
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # the store may use another name for the root
+        data = opened[name if name in opened else next(iter(opened))]  # the root may have another name in the store
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}
@@ -101,6 +97,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return a mask of cases as an array whose dimensions and values have the order of the series."""
+    """Return a mask of cases in the order that the dimensions and values have in the series."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

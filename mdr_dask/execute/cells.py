@@ -19,13 +19,13 @@ from mdr_dask.task import Work, versions
 
 @dataclass(frozen=True)
 class Cells:
-    """The results of one group that a round has to compute, or has to mark as not needed."""
+    """The results of one group that a round computes or marks as not needed."""
 
     template: Template
     # Masks with the shape of the group: results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
-    # Number of results of the round that are already in the store, and number of the failed results among them.
+    # Number of results of the round in the store, and number of failed results among them.
     kept: int
     failed: int
 
@@ -35,7 +35,7 @@ class Cells:
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the number of operations of a block, reduced in proportion to the results that the round computes."""
+        """Return the number of operations that the round needs for a block."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.operations(index) if part else 0.0
 
@@ -51,9 +51,8 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger to find the results that the round still has to compute.
 
-    `asked` marks the cases of the stage, and `needed` the cases that need the realisations of the round. `realisations`
-    are the index of the first realisation of the round, and the index of the last one plus 1. `own` marks the results
-    that this part of the campaign computes; if it is None, all results are computed.
+    `asked` marks the cases of the stage, and `needed` the cases that need the realisations of the round: those from
+    ``realisations[0]`` to ``realisations[1] - 1``. `own` marks the results of this part of the campaign (None: all).
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -72,7 +71,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """For each group, yield an array with the number of the part (1 to `count`) that computes each result."""
+    """For each group, yield an array with the part (1 to `count`) that computes each result."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)
@@ -82,7 +81,7 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
 
 
 def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
-    """Yield the tasks of a round one by one, so that the tasks of a large round are not all in memory together."""
+    """Yield the tasks of a round one by one, to save memory."""
     laid_out = store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: the store has been removed")

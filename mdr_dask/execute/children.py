@@ -1,8 +1,7 @@
 """Compute blocks in child processes of this machine, because a block may crash its process or take too long.
 
-A server process imports all modules and forks the children, which read blocks from pipes and write the outcomes to the
-same pipes. If a child dies, the server reports this through the pipe of the child, and forks a new child that uses the
-same pipe.
+A server process imports all modules and forks the children. A child reads blocks from its pipe and writes the outcomes
+to this pipe. If a child dies, the server reports this through the pipe and forks a new child for the pipe.
 """
 
 from __future__ import annotations
@@ -31,14 +30,12 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
 #: Code that the server process runs.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
-#: Environment variables that limit libraries for linear algebra to one thread. They can be set before any of these
-#: libraries is imported.
+#: Environment variables that limit libraries for linear algebra to one thread if they are set before the import.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: Time in s between the time limit of a case and the moment when its process is killed. Usually the process need not be
-#: killed, because a case in plain Python raises TimeoutError at the limit.
+#: Time in s after the time limit of a case at which its process is killed. A case in plain Python normally raises
+#: TimeoutError at the limit.
 GRACE = 1.0
-#: If this number of results of a case have crashed their process, the other results of the case are marked as failed:
-#: after each crash a new process is started, and a case may have thousands of realisations.
+#: After this number of crashes, the other realisations of the case are marked as failed without computing them.
 MOST_CRASHES = 2
 
 
@@ -57,10 +54,7 @@ class Child:
     server: subprocess.Popen[bytes]
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
-        """Compute a block in the child process, with at most `limit` seconds for each result.
-
-        If the child raises an error, for example because it cannot write to the store, raise the same error here.
-        """
+        """Compute a block in the child process, with at most `limit` seconds for each result."""
         try:
             self.pipe.send((work, limit))
             begun = self.pipe.recv()
@@ -85,10 +79,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model. The context ends when each child has finished its block.
-
-    If an exception ends the context, such as a second Ctrl-C, the child processes are killed.
-    """
+    """Start child processes for a model; at the end wait for their blocks, or kill them after an exception."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     path = os.pathsep.join(str(Path(folder).absolute()) for folder in sys.path)
@@ -112,8 +103,7 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
     """Compute a block that may crash its process.
 
     If the process crashes, each half of the block is computed alone, and so on down to single results. A single result
-    that crashes its process is marked as failed. If `MOST_CRASHES` results of a case have crashed their process, the
-    other results of the case are marked as failed too.
+    that crashes its process is marked as failed.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()
@@ -142,7 +132,7 @@ def serve(model: str, numbers: list[int]) -> None:
     """Import the modules that blocks need, and run one child for each pipe until the driver closes the pipe."""
     # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(Exception):  # an error is ignored here: the first block raises it again
+    with suppress(Exception):  # the first block raises the error again
         models.load(model)
     pipes = [Connection(number) for number in numbers]
     served = {_fork(pipe, pipes): pipe for pipe in pipes}
@@ -158,7 +148,7 @@ def serve(model: str, numbers: list[int]) -> None:
 
 
 def _fork(pipe: Connection, pipes: list[Connection]) -> int:
-    """Fork a child that computes the blocks that arrive through a pipe, and return the process number of the child."""
+    """Fork a child that computes the blocks from a pipe, and return its process number."""
     child = os.fork()
     if child == 0:
         for other in pipes:
@@ -178,7 +168,7 @@ def _describe(status: int) -> str:
 
 
 def _compute_blocks(pipe: Connection) -> None:
-    """Compute in this process the blocks that arrive through a pipe, until the other end of the pipe is closed."""
+    """Compute the blocks from a pipe in this process, until the other end of the pipe is closed."""
     while True:
         try:
             request = pipe.recv_bytes()
@@ -196,7 +186,7 @@ def _compute_blocks(pipe: Connection) -> None:
 
 @contextmanager
 def _limited(limit: float | None) -> Iterator[None]:
-    """Limit the time of a case of a plain Python model; a case that takes longer raises TimeoutError."""
+    """Raise TimeoutError if a case of a plain Python model takes too long."""
     from mdr_dask.models import per_case
 
     def alarm(_number: int, _frame: FrameType | None) -> None:

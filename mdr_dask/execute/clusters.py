@@ -28,16 +28,14 @@ from mdr_dask.task import one_blas_thread
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
-#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time. The
-#: computation of one block takes about as long.
+#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time.
 TARGET_DURATION = "1s"
 #: Loggers whose messages explain why workers cannot be started. Messages of the run quote the last of these messages.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
-#: Loggers whose messages are discarded, because they only repeat errors that are reported anyway.
+#: Loggers whose messages are discarded, because they repeat errors that the run reports.
 ECHOES = ("distributed", "asyncio")
-#: Settings of a cluster on this machine. If a worker dies while it computes a block, Dask does not try the block again,
-#: but reports it to the run. The supervising process of the worker (the nanny) restarts the worker. Profiling is off,
-#: because it takes 4 % of a core for each worker.
+#: Settings of a cluster on this machine. If a worker dies, Dask reports its block to the run and does not try the block
+#: again; the supervising process (the nanny) restarts the worker. Profiling would take 4 % of a core for each worker.
 ON_THIS_MACHINE = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.scheduler.allowed-failures": 0,
@@ -65,7 +63,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        # the workers of a client that the user gives may be threads of this process
+        # the workers may be threads of this process
         stack.enter_context(one_blas_thread())
         most: int = 0
         replace_lost: Callable[[], None] | None = None
@@ -104,14 +102,13 @@ def _require_guard() -> None:
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them, because Dask adds handlers to both."""
+    """Return the named loggers and all loggers below them, because Dask adds handlers to all of them."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 
 
 @contextmanager
 def _redirected(logger: logging.Logger, handler: logging.Handler) -> Iterator[None]:
-    """Send the messages of a logger only to the given handler."""
     before = logger.handlers[:], logger.propagate, logger.level
     logger.handlers, logger.propagate = [handler], False
     logger.setLevel(logging.ERROR)
@@ -150,7 +147,7 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
 
 
 def cluster_class(name: str) -> type[Cluster]:
-    """Return the class of Dask clusters with the given dotted name; raise ClusterError if there is no such class."""
+    """Return the class of Dask clusters with a dotted name; raise ClusterError if there is none."""
     package, _, attribute = name.rpartition(".")
     try:
         found = getattr(import_module(package), attribute)

@@ -34,7 +34,7 @@ def of_block(name: str, work: Work, **facts: Any) -> Event:
 
 
 def ended(work: Work, outcome: Outcome) -> Event:
-    """Return an event about a block that has ended. The block counts as failed if any of its results has failed."""
+    """Return the event of a finished block, which counts as failed if any of its results has failed."""
     counts = {state.name.lower(): outcome.counts[state] for state in Status if outcome.counts[state]}
     failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
     seconds = outcome.compute_seconds + outcome.write_seconds
@@ -45,9 +45,8 @@ def ended(work: Work, outcome: Outcome) -> Event:
 class Progress:
     """The state of a run, counted in results. A result is one case in one realisation."""
 
-    # Numbers of results. `total` counts the results of all rounds that have begun, and `kept` those of them that were
-    # in the store before the run. `done`, `failed` (including not converged) and `not_needed` count the results that
-    # this run has written.
+    # Numbers of results: in all rounds that have begun (`total`), in the store before the run (`kept`), and written by
+    # this run (`done`, `failed` or not converged, and `not_needed`).
     total: int = 0
     kept: int = 0
     done: int = 0
@@ -55,12 +54,12 @@ class Progress:
     not_needed: int = 0
     # Number of failed results among `kept`.
     kept_failed: int = 0
-    # Number of results of this run that are done but have a warning, for example because they miss the accuracy.
+    # Number of results of this run that are done but have a warning.
     warned: int = 0
-    # Number of blocks and number of solutions that this run has computed. Several results may share one solution.
+    # Number of blocks and number of solutions that this run has computed. Results may share a solution.
     blocks: int = 0
     solves: int = 0
-    # Number of operations of all rounds that have begun, and number of operations of the blocks that are finished.
+    # Number of operations of all rounds that have begun, and of the finished blocks.
     estimated: float = 0.0
     finished: float = 0.0
     # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the
@@ -77,10 +76,7 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimated time in s to the end of this round, from the pace of this run; None if no block is finished.
-
-        The pace does not include the time for compiling kernels.
-        """
+        """Estimated time in s to the end of this round, without compilation; None before the first finished block."""
         busy = self.compute_seconds + self.write_seconds
         if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):
             return None

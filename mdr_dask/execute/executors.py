@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Number of blocks for each thread that are submitted at the same time, so that no thread waits for its next block.
+#: Number of blocks submitted at a time for each thread, so that no thread waits for its next block.
 AHEAD = 2
 
 
 class Executor(AbstractContextManager["Executor"]):
-    """Compute blocks on the given resources. Child processes are not started before there are blocks to compute.
+    """Compute blocks on the given resources.
 
     The blocks of a plain Python model are computed in child processes, because only one thread of a process can run
     Python at a time, and because a crash would end the run.
@@ -56,14 +56,14 @@ class Executor(AbstractContextManager["Executor"]):
             self._tell(Event("after a crash", {}, sentence))
 
     def connect(self) -> None:
-        """If the resources name a cluster, start it or connect to it. Call this before anything is written."""
+        """Start or connect to the cluster that the resources name, if any. Call this before anything is written."""
         if self._resources.remote and self._window is None:
             from mdr_dask.execute.clusters import task_window
 
             self._window = self._stack.enter_context(task_window(self._resources, self._tell))
 
     def __call__(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks, and call `settle` for each block when it ends. Blocks may end in any order."""
+        """Compute blocks, and call `settle` for each block when it ends."""
         self.connect()
         if self._window is not None:
             self._window.run(works, settle)
@@ -78,13 +78,8 @@ class Executor(AbstractContextManager["Executor"]):
                 self._in_pool(works, settle)
 
     def _in_pool(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks in threads. After an error or an interrupt, wait until the blocks that have started are
-        finished.
-
-        A second interrupt ends this wait. The pool is not used in a ``with`` statement, because the end of the
-        statement would then wait once more.
-        """
-        pool = ThreadPoolExecutor(self._threads)
+        """Compute blocks in threads; after an error or an interrupt, wait for blocks that have started."""
+        pool = ThreadPoolExecutor(self._threads)  # without `with`, whose end would wait even after a second interrupt
         remaining = iter(works)
         running: set[Future[list[tuple[Work, Outcome]]]] = set()
         try:

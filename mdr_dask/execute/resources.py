@@ -13,9 +13,8 @@ class Resources:
 
     Models in plain Python use processes instead of threads, unless `threads` is given. `scheduler` is the address of a
     running Dask scheduler, `cluster` a description from `mdr_dask.campaign.cluster.load_cluster`, and `client` a Dask
-    client, which is not closed at the end of the run. A run on a cluster ends with an error after `patience` seconds
-    without any worker. If `case_timeout` is given, a case fails after this time in s, and blocks are computed in child
-    processes.
+    client that stays open. A run on a cluster ends with an error after `patience` seconds without any worker. If
+    `case_timeout` is given, a case fails after this time in s, and blocks are computed in child processes.
     """
 
     threads: int | None = None

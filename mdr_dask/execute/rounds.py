@@ -1,8 +1,8 @@
 """Run a campaign stage after stage and round after round, until no result is missing in its store.
 
-A stage is the campaign with the values that its adaptive axes have so far. Its first round computes the first
-realisations of all cases; each further round adds realisations to the cases whose errors are still too large. The
-stored results determine the next stage and the next round, so a run can be stopped and repeated at any time.
+A stage is the campaign with the values that its adaptive axes have so far. The first round of a stage computes the
+first realisations of all cases; further rounds add realisations to cases whose errors are too large. The stored results
+determine the next stage and round, so a run can be stopped and repeated at any time.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from mdr_dask.replication import LEAST_GROWTH, growth_needed, known_scatter, nex
 from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
 
-#: `LOOK`: time in s between two checks of the progress of other parts. `PAUSE`: time in s between two messages about
-#: this progress.
+#: Time in s between two checks (`LOOK`) and between two messages (`PAUSE`) of the progress of other parts.
 LOOK, PAUSE = 1.0, 4.0
 
 
@@ -49,17 +48,14 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Round:
-    """One round of a stage."""
-
     # Shape, chunks and coordinates of every group of the store.
     layout: tuple[Template, ...]
-    # For each group, two masks of its cases: the cases of the stage, and the cases that need the realisations of this
-    # round.
+    # For each group, masks of the cases of the stage, and of the cases that need the realisations of this round.
     asked: list[BoolArray]
     needed: list[BoolArray]
-    # Index of the first realisation of the round, and index of the last one plus 1.
+    # Index of the first realisation of the round, and index of its last realisation plus 1.
     realisations: tuple[int, int]
-    # For each group, an array with the shape of its cases: the number of realisations of each case after the round.
+    # For each group, the number of realisations of each case after the round.
     taken: tuple[IntArray, ...]
 
 
@@ -113,10 +109,10 @@ def _merge(job: _Job) -> None:
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
-    """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
+    """Return how many results of a campaign are in its store and how many are missing.
 
-    Only the first round of each stage is counted. For adaptive axes, all values that are already known to be needed are
-    counted. If outputs have tolerances for their standard errors, only the values of the first stage are counted.
+    The first rounds of the stages are counted, up to the first unfinished stage. If outputs have tolerances for their
+    standard errors, only the first stage is counted.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -134,7 +130,6 @@ def outlook(campaign: Campaign, url: str) -> Progress:
 
 
 def _run_stages(job: _Job) -> Progress:
-    """Run stage after stage of a campaign, until its adaptive axes need no more values."""
     start = time.monotonic()
     progress = Progress()
 
@@ -173,11 +168,7 @@ def _run_stages(job: _Job) -> Progress:
 def _run_rounds(
     job: _Job, run_round: Callable[[_Round, list[Cells]], None], current: _Round | None = None
 ) -> _Round | None:
-    """Run the rounds of a stage. Each round adds realisations to the cases whose errors are still too large.
-
-    Return the last round, or None if the run cannot go on because another part has not finished a round and is not
-    running.
-    """
+    """Run the rounds of a stage and return the last; return None if an unfinished part is not running."""
     replication = job.stage.campaign.replication
     while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
         further = _next(job, current)
@@ -197,11 +188,7 @@ def _run_rounds(
 
 
 def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
-    """Finish a study whose adaptive axes need no more values.
-
-    If fitted constants have tolerances, add realisations until the tolerances are met or the limit is reached. Then
-    mark the results that are still missing as not needed.
-    """
+    """After the last stage, add realisations for fitted constants, then mark missing results as not needed."""
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
@@ -220,7 +207,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return the job without the tolerances of fitted constants, for use while values of adaptive axes are chosen."""
+    """Return the job without tolerances of fitted constants, for the stages before the last."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))
@@ -259,20 +246,17 @@ def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Temp
 
 
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
-    """Return the factor by which the number of realisations of each case must grow.
-
-    The factor is at most 1 for a case with enough realisations.
-    """
+    """Return the factor by which the number of realisations of each case must grow, at most 1 if it has enough."""
     own = [
         np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
         for mask, template in zip(last.needed, layout, strict=True)
     ]
     if not job.stage.campaign.replication.answers:
         return own
-    from mdr_dask.execute.answers import cases_that_narrow  # imported late, because it imports the fits
+    from mdr_dask.execute.answers import cases_that_narrow  # imported here, because it imports the fits
 
     narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
-    # the number of realisations that a fitted constant requires cannot be estimated
+    # least growth, because the number of realisations that a fitted constant needs cannot be estimated
     return [np.where(cases, np.maximum(each, LEAST_GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
 
 

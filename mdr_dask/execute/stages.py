@@ -1,7 +1,4 @@
-"""For campaigns with adaptive axes: find the cases of a stage in the store, and choose the values of the next stage.
-
-A stage depends only on the results of the previous stage, so a repeated run finds the same stage again.
-"""
+"""For campaigns with adaptive axes: find the cases of a stage in the store, and choose the values of the next stage."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.refinement import Mean, Mesh, Stage, refined
 
-#: For each group and each dimension, the positions in the store of the values of a stage.
+#: For each group and each dimension, the positions that the values of a stage have in the store.
 Places = tuple[Mapping[str, IntArray], ...]
 
 
@@ -36,7 +33,7 @@ def _all_of(template: Template) -> Mapping[str, IntArray]:
 
 
 def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Sequence[BoolArray]) -> list[BoolArray]:
-    """Convert masks of the cases of a stage to masks of the cases in the store, with the dimensions of the store."""
+    """Convert masks of the cases of a stage to masks of all cases in the store."""
     found = []
     for mesh, template, place, wanted in zip(stage.meshes, layout, places, cases, strict=True):
         dims = template.dims[:-1]
@@ -50,9 +47,9 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, and an event with the number of values on each adaptive axis.
+    """Return the stage after a finished stage, or None, and an event with the number of values on each adaptive axis.
 
-    The stage is None if no further values are needed. Only the first `realisations` realisations of each case are used.
+    Only the first `realisations` realisations of each case are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}

@@ -20,8 +20,7 @@ from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.plan import BlockIndex
 from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
 
-#: Time in s between two checks of the cluster. This time and `REPORT_PAUSE` together are less than five seconds, so a
-#: user soon learns that there is no worker.
+#: Time in s between two checks of the cluster.
 CHECK_PAUSE = 1.0
 #: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
@@ -31,8 +30,7 @@ ANSWER_LIMIT = 3.0
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
 
-#: `_OPEN`: context that ends the child process of a worker together with the worker. `_APART`: lock that a thread of
-#: the worker holds while it uses the child process.
+#: `_OPEN`: context that ends the child process of a worker with the worker. `_APART`: lock on the child process.
 _OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]
@@ -42,9 +40,8 @@ class TaskWindow:
     """The blocks that are submitted to a cluster at the same time: a few more than the cluster can compute at once.
 
     The run ends with an error after `patience` seconds without any worker, and a case fails after `case_timeout`
-    seconds. `most` is the largest number of threads of an adaptive cluster, and 0 for other clusters. `replace_lost`
-    requests workers in place of lost ones; it is None if the run need not replace workers. `last_message` returns the
-    last error message of the cluster.
+    seconds. `most` is the largest number of threads of an adaptive cluster, and 0 for other clusters. `replace_lost`,
+    if given, replaces lost workers. `last_message` returns the last error message of the cluster.
     """
 
     def __init__(
@@ -68,7 +65,7 @@ class TaskWindow:
         client.subscribe_topic("all", self._report_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process."""
+        """Compute blocks; if the worker of a block dies, compute the block once more, in a child process."""
         remaining = iter(works)
         suspects: set[tuple[str, BlockIndex]] = set()
 
@@ -187,5 +184,5 @@ def _report(work: Work) -> None:
 
 @lru_cache(maxsize=1)
 def _child(model: str) -> Child:
-    """Return the child process of this worker. It ends together with the worker."""
+    """Return the child process of this worker, which ends with the worker."""
     return _OPEN.enter_context(children(1, model))[0]
