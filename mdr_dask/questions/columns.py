@@ -20,7 +20,7 @@ from mdr_dask.questions.expression import ALTERNATIVES, Find, Value, evaluate, p
 
 #: Names of two columns: the state of a row, and the number of results in this row that are done.
 STATUS, REALISATIONS = "status", "realisations"
-#: Name of the variable with the number of results in each state. Only rows that are averages over cases have it.
+#: Name of the variable with the number of results in each state, which only averages over cases have.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -28,7 +28,7 @@ WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of a model by name. The result is empty if the model cannot be loaded."""
+    """Return the dimensionless numbers of a model by name, or nothing if the model cannot be loaded."""
     try:
         return {number.name: number for number in models.load(str(dataset.attrs.get("model"))).numbers}
     except ModelError:
@@ -36,7 +36,7 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the fixed parameters whose value is a word. Dots in their names are replaced by ``_``."""
+    """Return the fixed parameters whose value is a word, with ``_`` for dots in their names."""
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
@@ -47,8 +47,7 @@ def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
 def inner(dataset: xr.Dataset, name: str) -> xr.DataArray | None:
     """Return a parameter inside the values of an axis, such as ``indenter_radius`` along an axis of indenters.
 
-    Values of the axis without this parameter have NaN, or ``-`` if the parameter is a word. If no axis has such a
-    parameter, the result is None.
+    Return NaN (``-`` for words) at values of the axis without this parameter, and None if no axis has the parameter.
     """
     for axis in dataset.attrs.get("axes", []):
         for path, entries in entries_of(axis).items() if axis["name"] in dataset.coords else ():
@@ -64,7 +63,6 @@ def inner(dataset: xr.Dataset, name: str) -> xr.DataArray | None:
 
 
 def _unit(dataset: xr.Dataset, axis: Mapping[str, Any], path: tuple[str, ...]) -> str:
-    """Return the SI unit of a parameter inside the values of an axis."""
     kind = models.load(str(dataset.attrs.get("model"))).parameters
     above = axis["path"].split(".")[::-1]
     each = (reduce(lambda inside, key: {key: inside}, above, value) for value in axis["values"])
@@ -92,9 +90,7 @@ class Columns:
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit, or None if there is no such column. Outputs are averaged over the
-        realisations.
-        """
+        """Return a column with its unit, or None; outputs are averaged over the realisations."""
         if name not in self._found:
             self._found[name] = None  # prevents an infinite recursion if a formula refers to itself
             self._found[name] = self._make(name)
@@ -108,9 +104,7 @@ class Columns:
         return found
 
     def unknown(self, name: str) -> DataError:
-        """Return the error to raise for a name that is unknown, or for a dimensionless number if the study lacks a
-        quantity in its formula.
-        """
+        """Return the error for an unknown name, or for a dimensionless number that this study does not determine."""
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
@@ -125,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for a condition. A row has the state ``failed`` if any of its results failed."""
+        """Return a column for a condition, in which a row has every state of its results, such as ``failed``."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found
@@ -194,9 +188,7 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the state of every row as text. A row of one result has a state such as ``failed``, and a row of several
-    results has a state such as ``2 failed, 1 missing``.
-    """
+    """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several."""
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:
         status = dataset[STATUS]
         return status.copy(data=WORDS[status.to_numpy()]).drop_attrs()

@@ -26,10 +26,9 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: In conditions and selections, two numbers count as equal if their relative difference is at most `SAME`: users copy
-#: numbers from tables, which show six digits.
+#: Relative difference of equal numbers in conditions and selections; users copy numbers from tables with six digits.
 SAME = 1e-5
-#: A word equals a column with this dimension if it equals one of the words along it.
+#: Dimension of a column with several words in each row; the row equals a word if any of its words does.
 ALTERNATIVES = "alternatives"
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -54,9 +53,8 @@ Find = Callable[[str], xr.DataArray | None]
 class Value(NamedTuple):
     """The value of an expression: numbers in SI, words, or truth values.
 
-    `dimension` is the physical dimension of the numbers, such as length, as defined by pint. It is None for words,
-    truth values and numbers without a unit. If a number without a unit is compared with a quantity or added to it, the
-    number counts as a value in the SI unit of this quantity.
+    `dimension` is the physical dimension of the numbers in pint, such as length; it is None for words, truth values and
+    numbers without a unit. A number without a unit, compared with a quantity or added to it, is in SI.
     """
 
     array: Any
@@ -64,17 +62,13 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The letter with which numpy abbreviates the data type, such as ``f`` for floats. A lazy array is not
-        computed.
-        """
+        """The letter of numpy for the data type, such as ``f`` for floats."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed text. In the syntax tree `tree`, a name such as ``_quantity_0`` stands for a number with a unit;
-    `quantities` maps these names to their values.
-    """
+    """A parsed text: its syntax tree, with names such as ``_quantity_0`` for numbers with units, and their values."""
 
     text: str
     tree: ast.expr
@@ -101,20 +95,16 @@ def parse(text: str) -> Expression:
 
 
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
-    """Return the value of an expression. An unknown name raises DataError, and so does the comparison of a length with
-    a time.
+    """Return the value of an expression; raise DataError for an unknown name or for quantities that do not match.
 
-    `find` returns the values of a column with its unit in ``attrs["units"]``, or None if there is no column of this
-    name. Error messages suggest names from `known`.
+    `find` returns a column with its unit in ``attrs["units"]``, or None if there is no column of this name.
     """
     with np.errstate(all="ignore"):
         return _Evaluation(expression, find, known).value(expression.tree)
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Replace every number with a unit by a name, because Python cannot parse units. Also return the values of these
-    names.
-    """
+    """Replace numbers with units by names, because Python cannot parse units; also return the values of the names."""
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):
@@ -149,17 +139,13 @@ def _likely_mistake(text: str) -> str:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name that a node of the syntax tree stands for. Dots in the name of a nested parameter become
-    ``_``.
-    """
+    """Return the name that a node of the syntax tree stands for, with ``_`` for dots."""
     if isinstance(node, ast.Attribute):
         return f"{_name(node.value)}_{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
 
 
 class _Evaluation:
-    """The evaluation of the nodes of one expression."""
-
     def __init__(self, expression: Expression, find: Find, known: Sequence[str]) -> None:
         self.text, self.quantities, self.find, self.known = expression.text, expression.quantities, find, known
 
@@ -203,7 +189,7 @@ class _Evaluation:
             raise DataError(f"{self.text!r}: no column {name!r}{did_you_mean(name, self.known)}")
         try:
             return Value(found, dimension_of(found.attrs.get("units", "1"))[0] if found.dtype.kind in "fiu" else None)
-        except ValueError:  # a model of another package may use a unit that `mdr_dask.units` does not define
+        except ValueError:  # a model of another package may use an unknown unit
             return Value(found)
 
     def _truth(self, node: ast.expr) -> Any:
@@ -232,7 +218,7 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Compare numbers within `SAME`, or compare words. An unknown name counts as a word."""
+        """Compare numbers within `SAME`, or compare words; a name that is not a column is a word."""
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

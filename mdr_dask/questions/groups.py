@@ -1,6 +1,4 @@
-"""Averages over cases. All cases that have the same values along some axes form a group, and each group has one
-average.
-"""
+"""Averages over groups of cases. The cases of a group have the same values along some axes."""
 
 from __future__ import annotations
 
@@ -26,14 +24,13 @@ CASES = "cases"
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
     """Average every output over the cases of each group, separately for each realisation.
 
-    A group has C cases, and m_c is the mean of case c over its n_c realisations. All cases use the same R realisations,
-    so the results of different cases are correlated. Therefore realisation r of the group is ``m + R u_r``: m is the
-    mean of all m_c, and ``u_r`` the sum over c of ``(x_cr - m_c) / (n_c C)``, where x_cr is a result of case c. The
-    mean and the standard error of these R results are those of the group, even if n_c differs between cases.
+    A group has C cases; case c has n_c results x_cr with the mean m_c. All cases use the same R realisations, so the
+    results of different cases are correlated. Therefore the result of the group in realisation r is ``m + R u_r``:
+    m is the mean of all m_c, and ``u_r`` the sum over c of ``(x_cr - m_c) / (n_c C)``. The mean and the standard error
+    of the R results of a group are correct even if n_c differs between cases.
 
     `by` are names of axes, or of columns of a sampled study. If `kept` is given, only the cases where it is true are
-    included. In the result, the groups are along the dimension ``group``. The grid error of a group is the mean grid
-    error of its cases.
+    included. The groups are along the dimension ``group``.
     """
     import xarray as xr
 
@@ -67,9 +64,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """The cases of all groups. `order` are the indices of the cases, sorted by group, and group k begins at
-    ``order[starts[k]]``.
-    """
+    """The indices of the cases, sorted by group (`order`); group k begins at ``order[starts[k]]``."""
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]
@@ -80,9 +75,7 @@ class _Members:
         return np.diff(self.starts, append=self.order.size)
 
     def sums(self, values: NDArray[Any], dtype: type = float) -> NDArray[Any]:
-        """Return the sum of `values` over the cases of each group. The first dimension of `values` is that of the
-        cases.
-        """
+        """Return the sum of `values` over the cases (first dimension) of each group."""
         if not self.order.size:
             return np.zeros((0, *values.shape[1:]), dtype)
         return np.asarray(np.add.reduceat(values[self.order], self.starts, axis=0, dtype=dtype))
@@ -104,9 +97,7 @@ def _members(
 
 
 def _common(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the result of every group in each realisation (see `averaged`), with the shape (groups, ...,
-    realisations).
-    """
+    """Return the results of every group (see `averaged`), shape (groups, ..., realisations)."""
     there = np.isfinite(values)
     number = there.sum(axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -119,7 +110,7 @@ def _common(values: FloatArray, members: _Members) -> FloatArray:
 
 
 def _errors(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the mean grid error of every group. All realisations of a group get the same error."""
+    """Return the mean grid error of every group, the same for all its realisations."""
     each = _common(np.abs(values), members)
     there = np.isfinite(each)
     with np.errstate(invalid="ignore"):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mdr_dask.questions.table import Question
 
 
-#: Largest size in bytes of one piece of an array. Different pieces are computed on different cores.
+#: Largest size in bytes of a piece of an array; the pieces are computed in parallel.
 PIECE = 2**20
 
 
@@ -52,7 +52,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
 
 
 def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
-    """Divide arrays into small lazy pieces. Each piece contains all realisations of its cases."""
+    """Divide arrays into small lazy pieces, each with all realisations of its cases."""
     import dask
 
     with dask.config.set({"array.chunk-size": PIECE}):

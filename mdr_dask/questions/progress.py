@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class Group(NamedTuple):
     """Messages of one series that differ only in their numbers.
 
-    `kind` is the state of the results with these messages, such as ``failed``, or ``warning`` if the results are done.
-    `cases` is a text with the range of each varied parameter over these results.
+    `kind` is the state of the results, such as ``failed``, or ``warning`` if they are done. `cases` is a text with the
+    range of each varied parameter over the results.
     """
 
     series: str
@@ -42,13 +42,11 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the last message about each result of a series. A message is left out if the result now has another state
-    than the one that the message reports.
-    """
+    """Return the last message about each result of a series, unless the result has another state now."""
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
-        # only stores of version 0.2 and later have the key "place"
+        # stores of version 0.1 lack the key "place"
         for message in (each for each in record["messages"] if "place" in each):
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = store.ledger(url, series, dataset["status"].shape)
@@ -57,11 +55,9 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 
 
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
-    """Group messages that differ only in their numbers. If a result has several warnings, each of them is a separate
-    message.
+    """Group messages that differ only in their numbers; each warning of a result is a separate message.
 
-    `studies` are the series by name. Their attributes contain the campaign file, to whose units all quantities in the
-    messages are converted.
+    Quantities are converted to the units of the campaign file, which is in the attributes of the series `studies`.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -83,7 +79,7 @@ def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) 
 
 
 def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """For each warning, return the number of cases that have it. Details after the colon of a warning are removed."""
+    """Return the number of cases with each warning, without the details after the colon of a warning."""
     groups: dict[str, dict[tuple[Any, ...], str]] = {}
     for message in (each for each in found if each["status"] == "done"):
         for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
@@ -91,17 +87,14 @@ def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
     return {_merged(list(alike.values())): len(alike) for alike in groups.values()}
 
 
-#: Pattern of a number or range of numbers with an SI unit for which campaign files often use another unit.
+#: Numbers and ranges with an SI unit for which campaign files often use another unit.
 _QUANTITY = re.compile(
     r"(?<![\w.])(-?[\d.]+(?:e[-+]?\d+)?)((?:,? (?:to|and|or) -?[\d.]+(?:e[-+]?\d+)?)?) (K|rad/s|m/s|m|N|Pa)\b(?!\^)"
 )
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """For each SI unit in messages, return the unit that the campaign file uses instead, if it uses only one.
-
-    Temperatures in K are converted to degC, unless the file uses another unit for temperatures.
-    """
+    """Return, for each SI unit, the only unit of the campaign file for this quantity; for K, degC is the default."""
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():
@@ -130,9 +123,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def _merged(texts: Sequence[str]) -> str:
-    """Merge texts that differ only in their numbers. Numbers that differ become a range: ``a film ratio of 0.2 to
-    0.4``.
-    """
+    """Merge texts that differ only in their numbers: ``a film ratio of 0.2 to 0.4``."""
     columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
 
     def ends(_: re.Match[str]) -> str:

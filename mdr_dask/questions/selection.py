@@ -46,9 +46,7 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply each selection to every series in which the selected parameter varies. If it varies in no series, the
-    selection is applied to the first series, so that a wrong name or value raises an error.
-    """
+    """Apply each selection to every series in which its parameter varies, or else to the first series, to check it."""
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -59,9 +57,7 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases whose means over realisations meet a condition. The results of all other cases become NaN, and
-    their state becomes *not needed*.
-    """
+    """Keep the cases whose means over realisations meet a condition; mark all other cases as not needed."""
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -77,7 +73,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
 
 
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
-    """Return the group of the series called `series`. If `series` is None, return the only group of the study."""
+    """Return the group of a series, or the only group of a study if `series` is None."""
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
@@ -125,7 +121,7 @@ def _varies(dataset: xr.Dataset, name: str) -> bool:
 
 
 def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the values of an axis or parameter as a one-dimensional array. A fixed parameter has one value."""
+    """Return the values of an axis, or the value of a fixed parameter, as a one-dimensional array."""
     from xarray import DataArray
 
     if name in dataset.dims and name not in dataset.coords:
@@ -146,11 +142,11 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _chosen(axis: xr.DataArray, name: str, wanted: str, own: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return a mask of the values of an axis that a selection keeps; messages have the unit `own` of the campaign."""
+    """Return a mask of the values of an axis that a selection keeps; `own` is the unit for messages."""
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
-    given = ~np.isnan(values)  # a parameter inside the values of an axis is not given for all of them
+    given = ~np.isnan(values)  # some values of an axis of structures lack the parameter
     unit = str(axis.attrs.get("units", "1"))
     text = partial(shown, unit=unit, digits=6, written=own)
     chosen, values = np.zeros(values.shape, dtype=bool), values[given]
@@ -194,9 +190,7 @@ def _words(text: str) -> list[str]:
 def _nearest(
     values: NDArray[Any], wanted: float, name: str, text: Callable[[float], str], tell: Tell
 ) -> NDArray[np.bool_]:
-    """Return a mask of the value nearest to a number. If the number is outside the range of the axis, no value is
-    selected.
-    """
+    """Return a mask of the value nearest to a number; select no value for a number outside the axis."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -208,7 +202,7 @@ def _nearest(
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the two ends of every range in a selection. A single value is a range with equal ends."""
+    """Yield the two ends of every range in a selection, twice the same number for a single value."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]

@@ -1,4 +1,4 @@
-"""Answer a question with the rows of a table. The study is read in parts (boxes), so the first rows appear quickly."""
+"""Answer a question with the rows of a table. A large study is read in parts, so the first rows appear quickly."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: `ROWS`: largest number of rows in one step of the computation. `WHOLE`: largest size in bytes of a study that is
-#: read in one step.
+#: `ROWS`: largest number of rows computed together. `WHOLE`: largest size in bytes of a study that is read as a whole.
 ROWS, WHOLE = 2**16, 2**26
 
 
@@ -36,9 +35,8 @@ class Question:
     """A question about a group of a study. Without statistics, the table has one row for each result.
 
     `where` is a condition on single results, or on means if there are statistics. With `group_by`, the table has one
-    row for each combination of values of these axes, averaged over all other axes. `sort` contains columns or formulas,
-    with a leading ``-`` for descending order. `units` maps columns to the requested units. If `written` is true, axes
-    and parameters are in the units of the campaign file instead of SI.
+    row for each combination of values of the named axes. `sort` contains columns or formulas, with a leading ``-`` for
+    descending order. If `written` is true, axes and parameters are in the units of the campaign file.
     """
 
     outputs: tuple[str, ...] = ()
@@ -73,11 +71,10 @@ class Table:
 
 
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
-    """Answer a question about a group of a study. The rows of a data frame are computed when the caller reads this
-    frame.
+    """Answer a question about a group of a study; raise DataError for unknown names.
 
-    Unless the question sorts rows, the memory needed does not grow with the number of rows. `limit` is the number of
-    rows that the caller will read, or 0 for all. Unknown names raise DataError before any row is computed.
+    The rows of a data frame are computed when the caller reads this frame. `limit` is the number of rows that the
+    caller will read, or 0 for all.
     """
     maker = _Maker(dataset, question, tell)
     units = maker.units()
@@ -93,8 +90,6 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
 
 
 class _Maker:
-    """The computation of the frames of one question, box by box."""
-
     def __init__(self, dataset: xr.Dataset, question: Question, tell: Tell) -> None:
         raw = question.statistics is None
         texts = [question.where, *question.sort, *question.columns]
@@ -115,7 +110,7 @@ class _Maker:
         self.keys = 0
 
     def units(self) -> dict[str, str]:
-        """Compute one row, so that errors in the question are raised at once, and return the units of the columns."""
+        """Compute one row, to raise errors in the question at once, and return the units of the columns."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
@@ -129,9 +124,7 @@ class _Maker:
                 yield self._frame(rows)[0]
 
     def order(self) -> NDArray[np.intp]:
-        """Sort the rows. Entry k of the result is the position that row k of the sorted table has in the unsorted
-        table.
-        """
+        """Return the position in the unsorted table of each row of the sorted table."""
         import pandas as pd
 
         question = self._question
@@ -170,9 +163,7 @@ class _Maker:
 
     @property
     def may_leave_out(self) -> bool:
-        """Whether the table may have fewer rows than the study has cases, because an adaptive axis does not need all
-        cases.
-        """
+        """Whether the table may lack cases of the study, because an adaptive axis does not need all cases."""
         adaptive = "adaptive:" in str(self._data.attrs.get("campaign", ""))
         return adaptive and not (self._raw or self._question.group_by)
 
@@ -190,7 +181,6 @@ class _Maker:
         return [np.broadcast_to(value, rows.sizes["row"]) for value in values]
 
     def _names(self, rows: xr.Dataset) -> list[str]:
-        """Return the names of the columns of the table."""
         if self._question.columns:
             return list(dict.fromkeys([*self._question.columns, *self._outputs]))
         along = [str(name) for name, coord in rows.coords.items() if coord.dims == ("row",)]
@@ -200,7 +190,7 @@ class _Maker:
         return [*axes, *grouped, *self._outputs, *counted, STATUS]
 
     def _frame(self, rows: xr.Dataset) -> tuple[pd.DataFrame, dict[str, str]]:
-        """Return rows as a data frame, and the units of the columns of the frame."""
+        """Return rows as a data frame, and the units of its columns."""
         import pandas as pd
         import xarray as xr
 
@@ -228,7 +218,7 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Return the columns of a statistic. An interval and a set of quantiles have several columns."""
+    """Return the columns of a statistic, such as two columns for an interval."""
     if "bound" in array.dims:
         return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
     if "quantile" in array.dims:
@@ -237,11 +227,7 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes of at most `most` points. The boxes are in the order of the rows of the table, in which
-    the last dimension varies fastest.
-
-    If a box extends over several chunks of the store, it ends where a chunk ends.
-    """
+    """Divide a grid into boxes of at most `most` points, in C order; large boxes end at the ends of chunks."""
     dims, inner = list(sizes), 1
     cut = len(dims)
     while cut and inner * sizes[dims[cut - 1]] <= most:

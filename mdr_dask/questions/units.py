@@ -12,10 +12,9 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Suffixes of statistics that are values of an output, such as the mean.
+#: Suffixes of statistics that are values of an output.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: Suffixes of statistics that are differences between values of an output, such as errors. Differences of temperatures
-#: are converted without the zero point of the scale: an error of 5 K is an error of 5 degC.
+#: Suffixes of statistics that are differences between values of an output: an error of 5 K is an error of 5 degC.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
