@@ -36,7 +36,7 @@ from mdr_dask.store.study import array_of, document
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a block in a store."""
+    """The position of a block in a store."""
 
     url: str
     series: str
@@ -57,9 +57,8 @@ def write_block(
 ) -> None:
     """Write a block: first its record, then one whole chunk of every output, and finally its chunk of the ledger.
 
-    The record holds the digest of every chunk, so that one can tell later which chunks a killed task has written. Each
-    array of `values` has the shape of the region, followed by the further dimensions of the output. `values` is empty
-    if only the ledger changes.
+    Each array of `values` has the shape of the region, followed by the further dimensions of the output. `values` is
+    empty if only the ledger changes.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -98,7 +97,7 @@ def values(url: str, series: str, output: str) -> NDArray[np.float64]:
 
 
 def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
-    """Return the named arrays of a group. Without names, return the ledger and all outputs."""
+    """Return the named arrays of a group, by default the ledger and all outputs."""
     held = document(url, series)
     if held is None:
         raise StoreError(f"{url}: this store, or one of its groups, has been removed")
@@ -109,7 +108,7 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
-    """Return the arrays of a group, which are cached as long as the layout stays the same."""
+    """Return the arrays of a group, which are cached until the layout changes."""
     found, here = layout_mark(url), platform.node()
     if found != layout:
         what = f"{here} finds another store at this path, or a later shape of it" if found else f"not seen from {here}"
@@ -119,7 +118,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return arrays in memory with the codecs of the stored arrays, and the dictionary of their encoded chunks."""
+    """Return copies in memory of the arrays of a group, without values, and the dictionary of their encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory, empty = zarr.storage.MemoryStore(encoded), {}
     for name, array in shown.items():

@@ -24,7 +24,7 @@ from mdr_dask.errors import MdrDaskError, StoreError
 
 T = TypeVar("T")
 
-#: Name that the group at the root has if the store also has series.
+#: Name of the group at the root if the store also has series.
 ROOT = "-"
 #: Folder with claims, which replace locks in a store on a server or on a file system without locks.
 CLAIMS = ".claims/"
@@ -34,9 +34,9 @@ RECORD_FOLDER = ".layout"
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server: enough to hide the time until the server answers.
 AT_ONCE = 64
-#: Time in s after which a request to a server fails if there is no answer; no chunk takes that long.
+#: Time in s after which a request to a server without an answer fails.
 LONGEST_REQUEST = 120.0
-#: Number of files that are flushed to the disk at the same time, each by a thread. A block has about ten files.
+#: Number of threads that flush files to the disk; a block has about ten files.
 FLUSHERS = 8
 #: Version of the layout; stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
@@ -56,7 +56,7 @@ async def _answered(request: Awaitable[T]) -> T:
 
 
 class _RemoteStore(zarr.storage.FsspecStore):
-    """A Zarr store at a URL. Its requests fail if the server does not answer in time."""
+    """A Zarr store at a URL, whose requests fail if the server does not answer in time."""
 
     async def get(self, *arguments: Any, **options: Any) -> Any:
         return await _answered(super().get(*arguments, **options))
@@ -70,7 +70,7 @@ class _RemoteStore(zarr.storage.FsspecStore):
 
 @lru_cache(maxsize=16)
 def bytes_of(url: str) -> Any:
-    """Return the Zarr store at a path or URL; it maps the names of files to their bytes."""
+    """Return the Zarr store at a path or URL, which maps names of files to bytes."""
     path = local(url)
     if path is not None:
         return zarr.storage.LocalStore(path)
@@ -126,7 +126,7 @@ def parsed(content: bytes) -> Any:
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Yield the name and the content of many files, in the given order. The content of a missing file is None."""
+    """Yield the name and the content (None if missing) of many files, in the given order."""
     path = local(url)
     if path is not None:
         with guarded(url, "reading its files"):
@@ -147,7 +147,6 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
 
 
 def _content(file: Path) -> bytes | None:
-    """Return the content of a file, or None if it is missing."""
     try:
         return file.read_bytes()
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
@@ -162,8 +161,8 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages: each file is replaced in one step, after all files of the earlier stages.
 
-    On a disk, all files are first written under temporary names and flushed. Then the files of the earlier stages get
-    their final names, and these names are flushed. After that, the files of the last stage get their final names.
+    On a disk, all files are first written under temporary names and flushed. Files of the last stage get their final
+    names after the final names of the earlier stages have been flushed.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -217,7 +216,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its missing parents. Return the folders that may have a new entry."""
+    """Make a folder and its missing parents; return the folders to flush."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]
@@ -226,7 +225,6 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    """Wait until files and the entries of folders are on the disk; several of them are flushed at the same time."""
     with ThreadPoolExecutor(FLUSHERS) as pool:
         list(pool.map(flush, paths))
 
@@ -296,7 +294,7 @@ def require_bucket(url: str) -> None:
 
 
 def sweep(url: str) -> None:
-    """Remove the temporary files of killed processes. Call this only while no other run is active in the store."""
+    """Remove the temporary files of killed processes; call this only while no other run is active in the store."""
     path = local(url)
     if path is not None and path.is_dir():
         with guarded(url, "removing what a killed run left"):
@@ -328,20 +326,18 @@ def _raise_unless_gone(error: OSError) -> None:
 
 
 def group_name(series: str, member: str = "") -> str:
-    """Return the path of the group of a series, or of an array in it; without a series, the group is the root."""
+    """Return the path of the group of a series (without a series: the root), or of a member of this group."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block; `array` has `further` more dimensions than the ledger."""
+    """Return the name of the chunk of a block in an array with `further` dimensions that the ledger lacks."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
 def digest(content: bytes) -> str:
-    """Return the digest of a file.
-
-    A CRC would be the same number for all chunks, because each chunk ends with the CRC of the bytes before it.
-    """
+    """Return the digest of a file."""
+    # no CRC: it would be the same for all chunks, because a chunk ends with the CRC of the bytes before it
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
@@ -352,10 +348,7 @@ def with_digest(document: Mapping[str, Any]) -> bytes:
 
 
 def without_digest(line: bytes) -> dict[str, Any] | None:
-    """Return a document without its digest, or None if it is damaged.
-
-    A document that has no digest is not checked.
-    """
+    """Return a document without its digest, or None if it is damaged; a missing digest is no damage."""
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

@@ -30,22 +30,17 @@ log = logging.getLogger("mdr_dask.store")
 class Stored:
     """A campaign together with the results that a store already contains."""
 
-    # The campaign to lay out. Each axis has first the stored values in their order, then the new values of the
-    # campaign.
+    # The campaign to lay out. Each axis has first the stored values, then the new values.
     campaign: Campaign
     # Chunk lengths of the stored groups, by the names of their series.
     chunks: Mapping[str, Mapping[str, int]]
     realisations: int
-    # For each stored group and each dimension, the positions of the values of the given campaign on the extended axis.
+    # For each stored group and dimension, the positions of the values of the given campaign on the extended axis.
     places: Mapping[str, Mapping[str, IntArray]]
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
-    """Compare a campaign with the store that it resumes or extends; raise StoreError that lists all differences.
-
-    A campaign with series may extend a store without series. A series with the parameters and axes of the stored
-    results then stays at the root of the store.
-    """
+    """Compare a campaign with the store that it resumes or extends; raise StoreError with a list of all differences."""
     attributes(url)  # raises StoreError if this is not a study
     campaign = _with_root(url, campaign)
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
@@ -165,7 +160,7 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Flatten nested parameters to dotted paths. A parameter that names a file gets the digest of the file as value."""
+    """Flatten nested parameters to dotted paths, and replace the names of files by digests of the files."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
         if isinstance(value, Mapping) and not _is_file(value):
@@ -187,10 +182,7 @@ def _by_digest(value: Any) -> Any:
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Append the new values of a series to the stored values.
-
-    Also return, for each dimension, the positions of the values of the given series in the extended series.
-    """
+    """Append the new values of a series to the stored values; also return the positions of all values of the series."""
     places = {}
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
@@ -207,10 +199,9 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of each entry of a dimension. An entry consists of one value of every axis of the dimension.
+    """Return the position of each entry (one value of every axis) of a dimension.
 
-    Each key has two parts: the values of the entry as text, and the number of equal entries before it. Entries can be
-    equal, for example if whole numbers are sampled. Values that agree to `SAME_DIGITS` digits count as equal.
+    The keys are the values of the entry as text, and the number of equal entries before the entry.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
@@ -235,7 +226,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return a value of an axis from its stored form; a list or mapping is validated as a value of the parameter."""
+    """Return a value of an axis from its stored form; validate lists and mappings."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

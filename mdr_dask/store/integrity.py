@@ -9,8 +9,7 @@ from typing import Any
 
 from mdr_dask.store.files import RECORD_FOLDER, parsed, read_bytes, with_digest
 
-#: File with the record of the layout. For Zarr it is an empty group with attributes; Zarr would warn about any other
-#: file. No series can have this name.
+#: File with the record of the layout. For Zarr it is an empty group; Zarr would warn about any other file.
 RECORD = f"{RECORD_FOLDER}/zarr.json"
 #: Codecs of the arrays of a study. Other codecs are refused, because they might run code.
 CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}
@@ -20,10 +19,10 @@ CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}
 class LayoutRecord:
     """The record of the layout of a study."""
 
-    # For each file of the layout, the digests of all its versions, the newest last. The record is written before these
-    # files, and a run may be killed in between. So a stored file may have any of the versions.
+    # For each file of the layout, the digests of all its versions, the newest last: a run may be killed after it has
+    # written the record and before it writes the file.
     files: Mapping[str, list[str]]
-    # The content of the newest ``zarr.json``, with which `mdr_dask.store.repair` restores this file.
+    # The content of the newest ``zarr.json``, for `mdr_dask.store.repair`.
     root: str
 
     @property

@@ -40,8 +40,7 @@ from mdr_dask.version import __version__
 
 #: Number of values in a chunk of a coordinate, so large that nearly every axis has a single chunk.
 _COORDINATE_CHUNK = 4096
-#: Names of the attributes that `_series_attributes` returns. If series are added to a store without series, these
-#: attributes stay at the root.
+#: Names of the attributes that `_series_attributes` returns.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 #: Packages whose versions are written to the store.
 PACKAGES = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")
@@ -49,11 +48,10 @@ _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
 def lay_out(url: str, layout: Sequence[Template]) -> None:
-    """Create the arrays of every template, or extend existing arrays. Readers see either the old shape or the new one.
+    """Create the arrays of every template, or extend existing arrays; readers see either the old or the new shape.
 
     Files are written in this order: the record of the layout with the digests of all other files; coordinates and
-    metadata of arrays; metadata of groups; finally ``zarr.json``. A new store first gets a ``zarr.json`` without
-    arrays.
+    metadata of arrays; metadata of groups; finally ``zarr.json``.
     """
     held = document(url)
     if held is None:
@@ -82,7 +80,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
 
 def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
-    """Write the files of a layout in the order that `lay_out` describes; `root` is the content of ``zarr.json``."""
+    """Write the files of a layout in the order of `lay_out`; `root` is the content of ``zarr.json``."""
     metadata = metadata_files(json.loads(root))
     members = json.loads(root)["consolidated_metadata"]["metadata"]
     groups = {name: metadata.pop(name) for name in [f"{group}/zarr.json" for group in group_names(members)]}
@@ -130,7 +128,7 @@ def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return those of the given names that are chunks of coordinates, according to the metadata of the study."""
+    """Return the names that belong to chunks of coordinates, according to the metadata of the study."""
     members = root["consolidated_metadata"]["metadata"]
     groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
     data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
@@ -159,14 +157,14 @@ def layout_faults(url: str) -> Iterator[Finding]:
     is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
     for name, content in read_many(url, record.files):
         if content is None:
-            if not is_older:  # if zarr.json is older, a run was stopped before it wrote this file
+            if not is_older:  # otherwise a run was stopped before it wrote this file
                 yield Finding("missing", name, "part of the layout; --repair or the next run writes it again")
         elif digest(content) not in record.files[name]:
             yield Finding("damaged", name, "not what was written")
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment on how to open a study with series, because the study looks empty when opened as one dataset."""
+    """Return a comment on how to open a study with series, because as one dataset the study looks empty."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
@@ -174,7 +172,7 @@ def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _arrays_and_coordinates(template: Template) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Return the metadata of all arrays of a group, by their names, and the chunks of the coordinates of the group."""
+    """Return the metadata of the arrays of a group, and the chunks of its coordinates."""
     coordinates = _coordinates(template)
     files: dict[str, Any] = {}
     store = zarr.storage.MemoryStore(files)
@@ -282,7 +280,6 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
 
 
 def _measured(campaign: Campaign) -> dict[str, Any]:
-    """Return the table of measured points of a campaign; this table is stored with the results."""
     table = campaign.measured
     return {"measured": {"name": table.name, "text": table.read_text()}} if table else {}
 

@@ -33,7 +33,7 @@ class Blocks:
     # Number of blocks along each dimension, and length of a block.
     grid: tuple[int, ...]
     lengths: tuple[int, ...]
-    # For each array, the number of its dimensions that the ledger lacks. The first array is the ledger itself.
+    # For each array, beginning with the ledger, the number of dimensions that the ledger lacks.
     further: Mapping[str, int]
 
     @classmethod
@@ -61,10 +61,7 @@ class Blocks:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
-    """Return the current ``status`` array of a group, cut or padded with "missing" to `shape` if that is given.
-
-    The stored array is larger than `shape` if the run of another part has extended it.
-    """
+    """Return the ledger of a group, cut or padded with "missing" to `shape` if that is given."""
     metadata = document(url, series)
     if metadata is None:
         if shape is None:
@@ -84,7 +81,7 @@ def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArr
 
 
 def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.int8]:
-    """Read the ledger. Equal chunks are decoded only once, because most chunks are equal and decoding is slow."""
+    """Read the ledger, and decode equal chunks only once: most chunks are equal, and decoding is slow."""
     different: dict[bytes | None, int] = {None: 0}
     names = (blocks.chunk("status", block) for block in blocks.indices)
     numbers = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
@@ -107,11 +104,10 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    Only the layout and the ledger are read, not the values. If `to_run` is true, missing files of the layout are no
-    fault, because the run writes these files again.
+    The values are not read. If `to_run` is true, missing files of the layout are no fault: the run writes them again.
     """
     faults = _faults(url, series, to_run)
-    if any(faults):  # check again, because a run may have changed a file during the first check
+    if any(faults):  # check again: a run may have changed a file meanwhile
         first = list(itertools.islice(_faults(url, series, to_run), NAMED + 1))
         if first:
             more = ", and more" if len(first) > NAMED else ""
@@ -129,7 +125,7 @@ def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
         if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunk if all its values were NaN
             continue
         done = _has_done(ledger(url, name), blocks.lengths)
-        # list the chunks after reading the ledger, because a run writes the ledger last
+        # list chunks after reading the ledger, which a run writes last
         present = set(listed(url, group_name(name)))
         for array in list(blocks.further)[1:]:
             chunks = (blocks.chunk(array, tuple(block)) for block in np.argwhere(done).tolist())

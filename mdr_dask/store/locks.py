@@ -1,8 +1,8 @@
 """Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
 If the file system has locks, the operating system releases them when a process ends. On other file systems, and at
-URLs, a run makes a claim: a file that only one process can create, and a second file that its owner regularly writes as
-a sign of life. A run also holds a lock named the gate while it looks for active runs or lays out the study.
+URLs, a run makes a claim: it creates a file, which only one process can do, and regularly writes a second file as a
+sign of life. A run also holds a lock named the gate while it searches for active runs or lays out the study.
 """
 
 from __future__ import annotations
@@ -41,18 +41,17 @@ from mdr_dask.store.files import (
 
 try:
     import fcntl
-except ImportError:  # without this module, runs make claims instead of locks
+except ImportError:  # runs then make claims
     fcntl = None  # type: ignore[assignment]
 
 #: `BEAT`: time in s between two signs of life of a run with a claim. `SILENCE`: time in s without a sign of life after
-#: which the run counts as ended: several signs may be lost, and clocks may differ by some seconds.
+#: which the run counts as ended; clocks may differ by some seconds.
 BEAT = 10.0
 SILENCE = 60.0
-#: Time in s for which a process tries to acquire a lock that another process holds. The other process may hold the lock
-#: only for an instant, to check whether the lock is free.
+#: Time in s for which a process tries to acquire a lock, which another process may hold for an instant to check it.
 GLANCE = 0.5
-#: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: a message is logged if a process
-#: has waited for the gate this long (in s), so that a user reads it within five seconds.
+#: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
+#: message is logged.
 POLL, PATIENCE = 0.05, 4.0
 #: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
@@ -66,16 +65,15 @@ log = logging.getLogger("mdr_dask.store")
 
 @dataclass(frozen=True)
 class Lock:
-    """A lock that a run holds. The tasks of the run write only while the run holds the lock."""
+    """A lock that a run holds while its tasks write."""
 
     # Name of the lock; the exclusive lock has an empty name.
     name: str
-    # Unique identifier of the run. It is empty if the run can only read.
+    # Unique identifier of the run, empty if the run can only read.
     owner: str
     # Number of the claim; None if the lock is one of the operating system.
     claim: int | None = None
-    # Whether an earlier run crashed or was killed while it held this lock or, if this is the exclusive lock, a lock of
-    # a part.
+    # Whether an earlier run crashed or was killed while it held this lock (for the exclusive lock: any lock).
     after_crash: bool = False
 
 
@@ -99,18 +97,15 @@ class Part:
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, from the position of the block among all blocks.
 
-        With 3 parts, the blocks belong in turn to the parts 1, 2, 3, then 2, 3, 1, then 3, 1, 2, and so on. If the
-        order were always 1, 2, 3, all blocks at one position on an axis of 3 blocks would belong to the same part.
+        With 3 parts, the blocks belong in turn to the parts 1, 2, 3, then 2, 3, 1, then 3, 1, 2, and so on. With the
+        order 1, 2, 3, 1, 2, 3, one part would get all blocks at one position on an axis of 3 blocks.
         """
         return cls((position + position // count) % count + 1, count)
 
 
 @contextmanager
 def exclusive(url: str) -> Iterator[Lock]:
-    """Lock a study for one run; raise StoreBusyError if another run or a part is active.
-
-    If the store is read-only, the run can only read.
-    """
+    """Lock a study for one run; raise StoreBusyError if another run or a part is active."""
     with ExitStack() as held:
         with gate(url):
             parts = _parts(url)
@@ -162,10 +157,7 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Name the process that runs the whole study (None if there is none), and return the active parts.
-
-    Nothing is written.
-    """
+    """Return the name of the process that runs the whole study (None if there is none), and the active parts."""
     return (_holder(url) if _is_held(url) else None), _parts(url)
 
 
@@ -219,8 +211,7 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
     """Check that a run still holds its lock; raise StoreBusyError if not, and StoreError if the store can only be read.
 
-    With a lock of the operating system, no other run can take over the lock until this context ends. A claim is checked
-    only when the context begins.
+    No other run can take over a lock of the operating system until this context ends. A claim is checked only once.
     """
     if not lock.owner:
         raise StoreError(f"{url}: the study is not finished, and nothing can be written here (permission denied)")
@@ -248,13 +239,13 @@ def _lock_file(url: str, name: str = "") -> Path:
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # for example, for a link to itself, or a null character
+    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, or a null character
         raise StoreError(f"{url}: expected a path: {error}") from None
     return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
 
 
 def _locked(file: Path) -> int:
-    """Lock a lock file and return its descriptor; create the file again if another process deletes it meanwhile."""
+    """Lock a lock file and return its descriptor; create the file again if another process deletes it."""
     give_up = time.monotonic() + GLANCE
     while True:
         if not file.parent.exists():
@@ -276,14 +267,14 @@ def _locked(file: Path) -> int:
 
 
 def _flock(descriptor: int, shared: bool = False) -> None:
-    """Acquire a lock of the operating system without waiting. If another process holds it, raise BlockingIOError."""
+    """Acquire a lock of the operating system, or raise BlockingIOError if another process holds it."""
     if fcntl is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
 
 
 def _is_held(url: str, name: str = "") -> bool:
-    """Return whether a process holds a lock. Nothing is written."""
+    """Return whether a process holds a lock, without writing to the store."""
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
         return True
@@ -305,14 +296,13 @@ def _is_held(url: str, name: str = "") -> bool:
 
 
 def _parts(url: str) -> list[Part]:
-    """Return the active parts."""
     numbers = (name.removeprefix(_PART).split("-of-") for name in _part_locks(url))
     known = sorted(Part(int(number), int(count)) for number, count in numbers)
     return [part for part in known if _is_held(url, part.lock)]
 
 
 def _part_locks(url: str) -> list[str]:
-    """Return the names of the existing locks of parts, whether they are held or not."""
+    """Return the names of all locks of parts, held or not."""
     names = {claim.removeprefix(CLAIMS).partition("/")[0] for claim in listed(url, CLAIMS)}
     if local(url) is not None:
         file = _lock_file(url)
@@ -327,7 +317,7 @@ def _busy(url: str, who: str) -> StoreBusyError:
 
 
 def _holder(url: str, name: str = "") -> str:
-    """Return a text that names the process that holds a lock, for use in messages."""
+    """Return a text that names the process that holds a lock."""
     names = [_read_claim(url, _claim(name, number)).get("who") for number in sorted(_numbers(url, name), reverse=True)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
@@ -365,7 +355,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Remove the runner files of a lock. Before a file is removed, wait until no task of its run is writing."""
+    """Remove the runner files of a lock, each after no task of its run is writing."""
     give_up = time.monotonic() + SILENCE
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
@@ -406,7 +396,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
     def live() -> None:
         while not ended.wait(BEAT):
-            # go on after an error, because the network may come back; blocks are written only while the claim exists
+            # go on after an error: the network may come back, and blocks are written only while the claim exists
             with suppress(StoreError):
                 write_bytes(url, _life(name, number), json.dumps({"time": time.time()}).encode())
 
@@ -417,7 +407,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
     finally:
         ended.set()
         alive.join()
-        with suppress(StoreError):  # without a network the claim is not removed; the next run replaces it
+        with suppress(StoreError):  # if there is no network, the next run replaces the claim
             if _read_claim(url, _claim(name, number)).get("owner") == owner:
                 remove(url, [_claim(name, number), _life(name, number)])
 
@@ -430,7 +420,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
     number = max(standing, default=0) + 1
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
-        # if only the reply of the server was lost, the claim is that of this run
+        # this run has made the claim if only the reply of the server was lost
         if _read_claim(url, _claim(name, number)).get("owner") != owner:
             raise _busy(url, _holder(url, name))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
@@ -442,7 +432,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the last sign of life of the owner of a claim is recent, or a new one appears soon."""
+    """Return whether the owner of a claim has recently written a sign of life, or soon writes one."""
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:
@@ -455,7 +445,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
 
 
 def _read_claim(url: str, name: str) -> dict[str, Any]:
-    """Return the content of a claim or of a sign of life; an empty dictionary if the file is missing or incomplete."""
+    """Return the content of a claim or a sign of life, empty if the file is missing or incomplete."""
     try:
         return read_json(url, name) or {}
     except StoreError:

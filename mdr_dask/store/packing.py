@@ -14,14 +14,13 @@ from mdr_dask.store.files import listed, read_many
 from mdr_dask.store.layout import Finding
 from mdr_dask.store.verification import CHECKSUMS, Inspection, of_store, verify
 
-#: Largest accepted ratio of the size of a file to its size in the zip, for files of more than `SMALL` bytes: a file
-#: with a larger ratio might fill the disk when it is unpacked. Chunks are compressed already, so their ratio is about
-#: 1, and that of metadata is about 10.
+#: Largest accepted ratio of the size of a file to its size in the zip, for files of more than `SMALL` bytes, so that no
+#: zip fills the disk. The ratio is about 1 for chunks, which are compressed already, and 10 for metadata.
 LARGEST_RATIO, SMALL = 100, 2**20
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and the content of every file of the study itself, without those that a publication adds."""
+    """Yield the name and the content of every file of a study, except the files that a publication adds."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content
@@ -35,7 +34,7 @@ def verify_packed(path: Path) -> Inspection:
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
             expected = _checksums(path, packed)
-            packed.extractall(folder)  # `extractall` never writes outside the folder, even if a file name contains ".."
+            packed.extractall(folder)  # it never writes outside the folder, even if a file name contains ".."
             findings = list(_compare(folder, expected))
             try:
                 inspected = verify(folder)
@@ -50,7 +49,7 @@ def verify_packed(path: Path) -> Inspection:
 
 
 def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
-    """Return the expected checksum of every file in a zip, after checking that none unpacks to a huge size."""
+    """Return the expected checksum of every file in a zip; raise StoreError if a file would unpack to a huge size."""
     for entry in packed.infolist():
         if entry.file_size > max(SMALL, LARGEST_RATIO * entry.compress_size):
             size = f"{entry.compress_size} bytes that unpack to {entry.file_size}"

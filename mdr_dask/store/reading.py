@@ -22,8 +22,7 @@ from mdr_dask.store.study import series_names
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Groups larger than this, in bytes, are read through Dask. Dask is several times slower, but can handle groups that do
-#: not fit into memory.
+#: Groups larger than this, in bytes, are read through Dask, because they may not fit into memory.
 LAZY_BYTES = 2**30
 
 
@@ -39,7 +38,7 @@ def readable(url: str) -> Iterator[None]:
 
 
 def is_damage(error: Exception) -> bool:
-    """Return whether an error comes from Zarr or its codecs; such an error means that a chunk cannot be read."""
+    """Return whether an error means that a chunk cannot be read: it comes from Zarr or its codecs."""
     *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
     package = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
     return not isinstance(error, OSError) and package in ("zarr", "numcodecs")
@@ -66,7 +65,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
-    # load coordinates now, because every step of a reduction would read a lazy coordinate again
+    # every step of a reduction would read a lazy coordinate again
     dataset = dataset.assign_coords({name: each.copy(data=each.to_numpy()) for name, each in dataset.coords.items()})
     for dim in dataset.dims:
         if (
@@ -75,28 +74,25 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             and not dataset.indexes[dim].is_monotonic_increasing
         ):
             dataset = dataset.sortby(dim)
-    # the layout has the entries of the first value of a structured axis as if they were fixed
+    # remove the coordinates that hold only the first value of a parameter inside a structured axis
     inner = {"_".join(path) for axis in dataset.attrs["axes"] for path in entries_of(axis)}
     order = [*dataset.attrs["outputs"], "status"]
     return dataset[order].drop_vars(inner & dataset.coords.keys())
 
 
 def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a copy whose attributes fit into netCDF: those that are neither texts nor numbers become JSON texts."""
+    """Return a copy for netCDF, in which attributes other than texts and numbers are JSON texts."""
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # without it, no run can extend the copy
+        if value is not None and name != "mdr_dask_layout"  # a run may not extend the copy
     }
     return plain
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
-
-    Lazy arrays are written piece by piece.
-    """
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``, lazy arrays piece by piece."""
     plain = with_plain_attributes(dataset)
     if path.suffix == ".nc":
         if not (find_spec("h5netcdf") and find_spec("h5py")):

@@ -1,6 +1,6 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-A run writes one file for each block. From time to time it merges many of these files into one, because a folder with a
+A run writes one file for each block, and from time to time merges many record files into one, because a folder with a
 hundred thousand files would be slow.
 """
 
@@ -41,7 +41,7 @@ def name_of(series: str, index: BlockIndex, attempt: int) -> str:
 
 
 def decoded(line: bytes) -> dict[str, Any] | None:
-    """Return a record, or None if it is damaged. Records of version 0.1 have no digest and count as undamaged."""
+    """Return a record, or None if it is damaged (records of version 0.1 have no digest and count as undamaged)."""
     record = without_digest(line)
     try:
         return record if record is not None and _is_one(record) else None
@@ -88,7 +88,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Log a warning of damaged records; it is repeated only if their number changes."""
+    """Log a warning of damaged records, again only if their number changes."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 
@@ -110,8 +110,7 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 def merge_records(url: str, series: str) -> None:
     """Merge record files of single blocks into files with many records, if the blocks are in the ledger.
 
-    If a process is killed while it merges files, or two processes merge files, a record can be in two files. Readers
-    use it only once.
+    A record can be in two files if a process is killed while it merges files, or if two processes merge files.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

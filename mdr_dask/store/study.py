@@ -31,7 +31,7 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     """Return the metadata of a group from ``zarr.json``, or None if the group does not exist.
 
-    The result is cached, so do not change it. Raise StoreError if this program did not write the metadata.
+    The result is cached: do not change it. Raise StoreError if this program did not write the metadata.
     """
     content = read_bytes(url, "zarr.json")
     if content is None:
@@ -45,7 +45,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
-    """Return the metadata of a study; None if they are not safe or the record of the layout lacks their digest."""
+    """Return the metadata of a study, or None if they are unsafe or not in the record of the layout."""
     root = parsed(content)
     if not isinstance(root, dict) or not isinstance(attributes := root.get("attributes", {}), dict):
         return None
@@ -69,12 +69,12 @@ def group_of(root: Mapping[str, Any], group: str) -> Mapping[str, Any] | None:
 
 
 def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """Return the metadata of the members of a group. Each key is the name of a member inside the group."""
+    """Return the metadata of the members of a group, by their names inside the group."""
     return {name.removeprefix(f"{group}/"): each for name, each in members.items() if name.startswith(f"{group}/")}
 
 
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
-    """Return the Zarr array with the given metadata. This is faster than opening the group."""
+    """Return the Zarr array with the given metadata, which is faster than opening the group."""
     return zarr.Array(zarr.AsyncArray(dict[str, Any](metadata), StorePath(store, path)))  # type: ignore[call-overload]
 
 
@@ -112,15 +112,12 @@ def _root_attributes(url: str) -> dict[str, Any] | None:
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:
-    """Return whether attributes are those of a study whose first run was stopped before the study was laid out."""
+    """Return whether a study with these attributes was never laid out, because its first run was stopped."""
     return list(found) == ["mdr_dask_layout"]
 
 
 def attributes(url: str) -> dict[str, Any]:
-    """Return the attributes of a study.
-
-    Raise StoreError if there is no study of mdr_dask, or if its layout has a later version.
-    """
+    """Return the attributes of a study; raise StoreError if there is none, or if its layout has a later version."""
     refuse_file(url)
     found = _root_attributes(url)
     if found is None:
@@ -136,10 +133,7 @@ def attributes(url: str) -> dict[str, Any]:
 
 
 def series_names(url: str) -> list[str]:
-    """Return the names of the groups of a study.
-
-    The group at the root has the name ``""``, or `ROOT` if the study also has series.
-    """
+    """Return the names of the groups of a study: ``""`` for the root, or `ROOT` if the study also has series."""
     root = "axes" in attributes(url)
     members = (document(url) or {})["consolidated_metadata"]["metadata"]
     names = [name for name, member in members.items() if member["node_type"] == "group"]

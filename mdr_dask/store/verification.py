@@ -40,9 +40,9 @@ class Group:
     """A group of a store during verification: its blocks, and the faults that `repair` removes."""
 
     blocks: Blocks
-    # For each block and each attempt to compute it, the digest of the chunk of each array that was written.
+    # For each block and each attempt to compute it, the digest of each written chunk by the name of its array.
     attempts: dict[BlockIndex, dict[int, Mapping[str, str]]] = field(default_factory=dict)
-    # Blocks whose records are merged. A record is merged only if its block is in the ledger.
+    # Blocks that must be in the ledger, because their records are merged.
     finished: set[BlockIndex] = field(default_factory=set)
     bad_blocks: set[BlockIndex] = field(default_factory=set)
     bad_records: set[str] = field(default_factory=set)
@@ -51,10 +51,10 @@ class Group:
 
 @dataclass
 class Inspection:
-    """What was found in a store."""
+    """The result of the verification of a store."""
 
     findings: list[Finding] = field(default_factory=list)
-    # Messages about things that are not damage, for example that a run was interrupted.
+    # Messages about events that are no damage, such as an interrupted run.
     notes: list[str] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
     # Number of files in the store, and number of blocks that are in the ledgers.
@@ -77,7 +77,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
     Damaged metadata are written again. Damaged coordinates, blocks and records are removed, and the next run writes
-    them again. Of foreign files, only those in the folders of chunks and records are removed.
+    them again. Foreign files are removed only from the folders of chunks and records.
     """
     refuse_file(url)
     with exclusive(url):
@@ -92,7 +92,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
         remove(url, [name for name in (RECORD, *coordinate_files(root, bad)) if name in bad])
         for group in found.groups:
             for block in sorted(group.bad_blocks):
-                # `further` begins with the ledger, so the ledger is removed first
+                # `further` begins with the ledger: the ledger is removed first
                 remove(url, [group.blocks.chunk(name, block) for name in group.blocks.further])
             _remove_records(url, group)
             remove(url, group.foreign)
@@ -100,7 +100,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield those of the names that belong to the study itself, and not to an active run or a publication."""
+    """Yield the names that belong to the study itself, and not to an active run or a publication."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)):
             yield name
@@ -164,7 +164,7 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
         else:
             block = tuple(record["block"])
             group.attempts.setdefault(block, {})[record["attempt"]] = record.get("chunks", {})
-            if is_merged:  # a record is merged only when its block is in the ledger
+            if is_merged:  # records are merged only for blocks in the ledger
                 group.finished.add(block)
             continue
         found.findings.append(finding)
@@ -202,7 +202,6 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
 
 
 def _faults(group: Group, block: BlockIndex, contents: Mapping[str, bytes | None]) -> Iterator[Finding]:
-    """Yield the faults of a block that is in the ledger."""
     history = [chunks for _, chunks in sorted(group.attempts.get(block, {}).items())]
     if not history:
         yield Finding("missing", name_of(group.blocks.series, block, 1), "the record of a block that is done")
@@ -221,11 +220,10 @@ def _faults(group: Group, block: BlockIndex, contents: Mapping[str, bytes | None
 
 
 def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> set[str]:
-    """Return the digests that the chunk of an array may have; `status` is the digest of the ledger of the same block.
+    """Return the digests that the chunk of an array may have; `status` is the digest of the chunk of the ledger.
 
-    Normally, the attempt that wrote this ledger has also written the chunk. If that attempt wrote only the ledger, the
-    chunk comes from the last earlier attempt that wrote the array. The chunk may also come from a later attempt that
-    was killed before it wrote its ledger.
+    The chunk may come from the last attempt that wrote the array before or together with the chunk of the ledger, or
+    from a later attempt that was killed before it wrote its ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()
@@ -236,7 +234,7 @@ def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> s
 
 
 def _remove_records(url: str, group: Group) -> None:
-    """Remove files with damaged records or records of damaged blocks; first copy the good records to a new file."""
+    """Remove files with records that are damaged or of damaged blocks; first copy their good records to a new file."""
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
     bad |= {name for name, _, record in found if record is None or tuple(record["block"]) in group.bad_blocks}
