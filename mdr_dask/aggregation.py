@@ -1,6 +1,6 @@
 """Reduce results over realisations to means, standard deviations, quantiles and intervals.
 
-An output may have a companion: a second variable with the discretisation errors of the output.
+The companion of an output is a variable with the discretisation errors of the output.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 class Statistic:
     """One reduction over ``realisation``: its name, its meaning and the function that computes it.
 
-    The function takes an output and its companion, if any. It returns None if it needs the companion and there is none.
+    The function takes an output and its companion (or None), and returns None if it needs a missing companion.
     """
 
     name: str
@@ -55,15 +55,12 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: the mean of the absolute errors, because errors need not cancel."""
+    """Return the discretisation error of the mean: the mean of the absolute errors."""
     return mean(abs(error))
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the ends of the bootstrap interval of the mean, along the new dimension ``bound``.
-
-    The interval includes the discretisation error of the mean.
-    """
+    """Return the ends of the bootstrap interval of the mean, with the discretisation error, along ``bound``."""
     count = array.sizes["realisation"]
     if error is not None:
         array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
@@ -74,8 +71,7 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return the mean, and both ends of the interval of the mean (see `interval`).
 
-    If the scatter is unknown, for example with one realisation, the interval is the mean plus or minus the
-    discretisation error. If this error is unknown too, both ends are NaN.
+    With one realisation, the interval is the mean plus or minus the discretisation error, or NaN if that is unknown.
     """
     array, error = array.compute(), None if error is None else error.compute()
     middle, ends = mean(array), interval(array, error)
@@ -89,11 +85,11 @@ def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.D
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the ends of the 95 % intervals of means, shape (..., 2).
 
-    The last axis of `values` contains `count` realisations, and then the discretisation error of the mean, if known.
+    The last axis of `values` contains `count` realisations and, if known, the discretisation error of the mean.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
-    step = 2**20 // bootstrap.RESAMPLES  # limits the memory for resampled means
+    step = 2**20 // bootstrap.RESAMPLES  # saves memory
     for start in range(0, len(flat), step):
         rows = flat[start : start + step].T
         stack = bootstrap.means(rows[:count])
@@ -159,10 +155,7 @@ def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
-    """Return statistics over the realisations of a group of a store, as variables ``<output>_<statistic>``.
-
-    If the arrays are lazy, the result is lazy.
-    """
+    """Return statistics over the realisations of a group of a store, as variables ``<output>_<statistic>``."""
     for name in statistics:
         if name not in NAMES:
             raise DataError(f"no statistic is called {name!r}{did_you_mean(name, NAMES)}")

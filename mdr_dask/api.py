@@ -15,7 +15,7 @@ Made by `python -m mdr_dask.api > docs/api.md`; do not edit. [Python](python.md)
 of the physics take and return numpy arrays in the units that each of them states. All examples are tested.
 """
 
-#: For each subject and module: the names of its public functions and classes, separated by blanks.
+#: For each subject and module, the names of public functions and classes, separated by blanks.
 PUBLIC: dict[str, dict[str, str]] = {
     "Studies": {"mdr_dask.studies": "run check open_study table aggregate fit plot master_curve StudyAccessor"},
     "Steady sliding": {
@@ -72,7 +72,7 @@ def _methods(thing: Any) -> str:
 
 
 def _markdown(docstring: str) -> str:
-    """Turn a numpydoc docstring into Markdown. Parameters become lists, and examples become blocks of code."""
+    """Turn a numpydoc docstring into Markdown."""
     lines = re.sub(r"^(\w[\w ]*)\n-{3,}$", r"**\1**", docstring, flags=re.M).splitlines()
     shown: list[str] = []
     section, in_code = "", False

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 #: `PAUSE`: seconds between two plain lines. `LIVE_PAUSE`: seconds between two updates of the live line.
 PAUSE, LIVE_PAUSE = 5.0, 0.5
 
-#: Function that draws the latest progress. Its other arguments are two times in s: the time since the start, and the
-#: time since the last change of the progress.
+#: Function that draws the progress. Its arguments: the progress, and the times in s since the start and since the last
+#: change of the progress.
 Draw = Callable[["Progress | None", float, float], None]
 
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that receives the progress of a run, and show the latest progress at regular intervals."""
+    """Yield a function that receives the progress of a run, and regularly show the latest progress."""
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:
@@ -42,7 +42,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 @contextmanager
 def at_work(what: str) -> Iterator[None]:
-    """Every few seconds, print the text `what` and the elapsed time, if stderr is a terminal."""
+    """Print the text `what` and the elapsed time every few seconds if stderr is a terminal."""
 
     def draw(_: Progress | None, elapsed: float, _unchanged: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
@@ -121,7 +121,7 @@ def _write(line: str) -> None:
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
 
-    Until the next block ends, the remaining time counts down; after it reaches zero, it is not shown.
+    The remaining time counts down until the next block ends; it is not shown at zero.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"
@@ -135,7 +135,6 @@ def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) 
 
 
 def _compiles() -> bool:
-    """Return whether numba is compiling in this process."""
     from mdr_dask.compile_clock import compile_clock
 
     return "numba" in sys.modules and compile_clock().is_running

@@ -2,8 +2,7 @@
 
 A *stack* is an array with three kinds of rows, in this order: one row with the mean; `RESAMPLES` rows with means of
 resampled realisations; and rows in which the mean is shifted by its discretisation errors. A fit is applied to every
-row, and `interval` computes the interval of a constant from the stack of fitted constants. The row of a resample that
-contains only failed realisations is NaN.
+row, and `interval` computes the interval of a constant from the stack of fitted constants.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from mdr_dask.arrays import FloatArray
 CONFIDENCE = 0.95
 #: Number of resamples; the ends of an interval are then accurate to about 5 % of its width.
 RESAMPLES = 400
-#: Largest number of groups into which values are divided. The values of a group are shifted, or left out, together.
+#: Largest number of groups of values that are shifted, or left out, together.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
@@ -30,10 +29,7 @@ NOTHING = -1000.0
 
 @lru_cache(maxsize=8)
 def weights(count: int) -> FloatArray:
-    """Return how often each resample draws each realisation, shape (1 + RESAMPLES, count); the first row is all ones.
-
-    All cases use the same resamples, because realisation number k has the same rough line in all cases.
-    """
+    """Return how often each resample draws each realisation, shape (1 + RESAMPLES, count); the first row is ones."""
     generator = np.random.Generator(np.random.Philox(0))
     drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
     both: FloatArray = np.vstack([np.ones(count), drawn])
@@ -42,10 +38,7 @@ def weights(count: int) -> FloatArray:
 
 
 def means(values: FloatArray) -> FloatArray:
-    """Return the stack of means over the first axis (realisations); values that are not finite are left out.
-
-    If there are fewer than two finite values, the means of the resamples are NaN.
-    """
+    """Return the stack of means of the finite values over the first axis (realisations)."""
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
     drawn = weights(values.shape[0])
@@ -58,16 +51,15 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values, with NaN for every realisation (first axis) in which any value is not finite."""
+    """Return the values, with NaN in realisations (first axis) in which any value is not finite."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return two rows for each group of neighbouring values: with this group shifted up, and with it shifted down.
+    """Return two rows for each group of neighbouring values: one with the group shifted up, one with it shifted down.
 
-    A value is shifted by its error, or by its own absolute value if the error is infinite. The values of all other
-    groups are not shifted.
+    A value is shifted by its error, or by its own absolute value if the error is infinite.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -103,14 +95,14 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum over all groups of the larger shift in the two rows of the group, or of 0 if both are negative."""
+    """Return the sum, over all groups, of the largest positive shift in the two rows of the group."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack with new shifted rows, in which groups of neighbouring cases are shifted, not single cases."""
+    """Return a stack in which the shifted rows shift groups of neighbouring cases instead of single cases."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)
@@ -119,10 +111,9 @@ def regrouped(stack: FloatArray) -> FloatArray:
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
     """Return the ends of 95 % intervals from a stack; with `positive`, they are computed from logarithms.
 
-    With few realisations, the percentiles of the resamples lie too close to the value in the first row. Their distances
-    from this value are therefore multiplied by `widening` for the number `count` of realisations. The shifts by
-    discretisation errors are added linearly, because an error that is the same in every realisation does not average
-    out.
+    With few realisations (`count`), the percentiles of the resamples lie too close to the mean; `widening` multiplies
+    their distances from the mean. Shifts by discretisation errors are added linearly, because an error that is the same
+    in every realisation does not average out.
     """
     values = logarithms(stack) if positive else stack
     enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
@@ -153,9 +144,8 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    `residuals` is a stack of the differences between data and law. If the law holds, the residuals of the data (the
-    first row) are about as large as the differences between the residuals of a resample and those of the data. The
-    result is NaN if there are too few resamples, for example with one realisation.
+    `residuals` is a stack of the differences between data and law. If the law holds, its first row (the data) is about
+    as large as the change of the residuals in a resample. The result is NaN for too few resamples.
     """
     caused = _caused(residuals, count)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
@@ -168,11 +158,7 @@ def scatter(residuals: FloatArray, count: int) -> float:
 
 
 def _caused(residuals: FloatArray, count: int) -> FloatArray:
-    """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples.
-
-    The rms residuals that the errors of the groups cause are combined as the root of the sum of squares, because
-    different groups affect different cases.
-    """
+    """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples."""
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))
     known = away[:RESAMPLES][~np.isnan(away[:RESAMPLES])]

@@ -22,7 +22,7 @@ class CompileClock:
             self._running += 1
 
     def end(self) -> None:
-        """Register the end of a compilation. A compilation that started before the clock existed is ignored."""
+        """Register the end of a compilation, unless it started before the clock existed."""
         with self._lock:
             if self._running == 1:
                 self._before += time.perf_counter() - self._since

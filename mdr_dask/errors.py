@@ -1,4 +1,4 @@
-"""The exceptions of mdr_dask, and parts of their messages. Workers pickle exceptions: use positional arguments only."""
+"""The exceptions of mdr_dask, and parts of their messages. Workers pickle them: use positional arguments only."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class FitError(MdrDaskError):
     """A law that cannot be fitted to the data."""
 
 
-#: Number of digits with which any two double-precision numbers can be distinguished.
+#: Number of digits that distinguish any two double-precision numbers.
 _ALL_DIGITS = 17
 
 
@@ -84,20 +84,17 @@ _SYNONYMS = {
     "alpha": ("pressure_viscosity",),
     "slip": ("slide_roll_ratio",),
 }
-#: For some names that a user may write, the message adds this text to the suggested name. It states how the suggested
-#: quantity differs from the quantity that the user named.
+#: How the suggested quantity differs from the quantity that the user named.
 _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead of a pressure"}
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the nearest known word, or else with all known words if there are at most 12."""
+    """Return a hint with the nearest known word, or else with all known words if there are few."""
     return similar(word, known) or (f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else "")
 
 
 def similar(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the nearest known word, such as `` (did you mean 'hurst'?)``, or an empty text if no word is
-    near.
-    """
+    """Return a hint with the nearest known word, such as `` (did you mean 'hurst'?)``, or an empty text."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

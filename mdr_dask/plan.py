@@ -20,22 +20,20 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations that a block of a large study should need. Such a block takes about a second to compute, and
-#: only milliseconds to schedule and to write.
+#: Number of operations of a block of a large study: about a second of computing, for milliseconds of scheduling and
+#: writing.
 OPERATIONS = 1e9
-#: A small study is cut into about this number of blocks, so that several workers can share it, but each block gets at
-#: least `LEAST` operations.
+#: A small study is cut into about `FEW_BLOCKS` blocks for several workers, each with at least `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share work are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
-#: Blocks of up to `MOST_SHARED` operations are halved only if the total number of operations then grows by less than
-#: this factor.
+#: Blocks below `MOST_SHARED` are halved only if the total number of operations then grows by less than this factor.
 REPEATED_WORK = 1.15
-#: Largest number of blocks of a series whose operations are counted one by one, so that `check` is fast.
+#: Largest number of blocks of a series whose operations are counted, so that `check` is fast.
 SAMPLED = 1000
-#: Largest number of records that are merged into one file. Such a file has about a megabyte.
+#: Largest number of records in one file, which then has about a megabyte.
 RECORDS_TOGETHER = 1000
-#: Largest size of a chunk, in bytes. A task holds one chunk of each output in memory.
+#: Largest size of a chunk in bytes; a task needs memory for one chunk of each output.
 CHUNK_BYTES = 64 * 2**20
 #: Largest number of results of a series; a larger number is taken to be a mistake in the campaign file.
 MOST_CASES = 10**9
@@ -53,7 +51,6 @@ class Template:
     sizes: Mapping[str, int]
     # Length of a block along each dimension.
     chunks: Mapping[str, int]
-    # The outputs. Each output is one array of the group; the array ``status`` is not among them.
     outputs: tuple[Output, ...]
     # Coordinates of the dimensions of outputs that are neither case dimensions nor ``realisation``.
     extra: Mapping[str, Coordinate]
@@ -92,7 +89,7 @@ class Template:
 
     @property
     def bytes(self) -> int:
-        """Size of all arrays, uncompressed."""
+        """Size of all arrays in bytes, before compression."""
         each = sum(8 * math.prod(self.extra_shape(output)) for output in self.outputs)
         return math.prod(self.shape) * (each + 1)
 
@@ -123,11 +120,7 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the approximate number of operations of a block.
-
-        The operations are counted for the block with the same cases and the first realisations. If the given block has
-        fewer realisations than that block, the number is reduced in proportion.
-        """
+        """Return the approximate number of operations of a block, counted for its cases and the first realisations."""
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
         first, known = (*cases, 0), self._known
@@ -136,11 +129,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the number of operations of a block.
-
-        If the model does not count operations, assume a number with which a study of N results gets about sqrt(N)
-        blocks.
-        """
+        """Return the number of operations of a block; if unknown, assume one that gives N results sqrt(N) blocks."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)
@@ -206,8 +195,7 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 class Estimate:
     """The costs of the first round of a campaign, as ``run --dry-run`` prints them.
 
-    `operations` is None if the model does not count them. `growth` is the largest factor by which adaptive axes can
-    increase the number of cases.
+    `operations` is None if the model does not count them. Adaptive axes can multiply the number of cases by `growth`.
     """
 
     cases: int
@@ -224,7 +212,7 @@ class Estimate:
 
     @property
     def seconds(self) -> float | None:
-        """Order of magnitude of the time on one core in s."""
+        """Estimated time in s on one core (order of magnitude)."""
         return None if self.operations is None else self.operations / OPERATIONS
 
     @property
@@ -236,10 +224,9 @@ class Estimate:
 def templates(
     campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
 ) -> tuple[Template, ...]:
-    """Lay out every series of a checked campaign for a number of realisations.
+    """Lay out every series of a campaign; raise CampaignError for too many results or a case with too much memory.
 
-    `stored_chunks` maps the name of each series that is already in the store to its chunk lengths. Raise CampaignError
-    with all problems if a series has too many results or a case needs too much memory.
+    `stored_chunks` contains the chunk lengths of the series that are already in the store.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -291,12 +278,12 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
 
 
 def available_memory() -> float:
-    """Return the memory of this machine in bytes, or the memory limit of its control group if the limit is smaller."""
+    """Return the memory of this machine, or of its control group if that has less, in bytes."""
     import psutil
 
     limits = [psutil.virtual_memory().total]
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
-        with suppress(OSError, ValueError):  # raised if the file does not exist or states no limit
+        with suppress(OSError, ValueError):  # the file does not exist or states no limit
             limits.append(int(Path(path).read_text()))
     return float(min(limits))
 
@@ -304,9 +291,9 @@ def available_memory() -> float:
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the length of a block along each dimension.
 
-    A block first gets all values of the axes along which cases share work; if this makes it too large, its lengths
-    along these axes are halved. If the block still has few operations, it gets more realisations, then more values of
-    the other axes, and finally the realisations of later rounds.
+    A block first gets all values of the axes along which cases share work; a block that is too large is halved along
+    these axes. A block with few operations gets more realisations, then more values of other axes, and finally the
+    realisations of later rounds.
     """
     shared = (
         axis.dim for path in model.whole for axis in template.series.axes if f"{axis.path}.".startswith(f"{path}.")
@@ -338,8 +325,8 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
     """Return whether to halve blocks along `dim`, a dimension along which cases share work.
 
-    Blocks of at most `most` operations are not halved, and blocks of more than `MOST_SHARED` operations are always
-    halved. Blocks in between are halved only if the halves repeat little of the shared work (`REPEATED_WORK`).
+    Blocks of at most `most` operations are not halved; other blocks are halved according to `MOST_SHARED` and
+    `REPEATED_WORK`.
     """
     now = template.mean_operations(chunks)
     if now <= most or now > MOST_SHARED:
@@ -352,8 +339,7 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts if a dimension is cut into nearly equal parts of at most `most` values.
 
-    If rounds add realisations, the length along ``realisation`` is a divisor of the number of realisations in the first
-    round: with 12 realisations and ``most = 5``, the length is 4.
+    If rounds add realisations, the length along ``realisation`` divides the number of realisations in the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication
@@ -385,14 +371,14 @@ def estimate(campaign: Campaign) -> Estimate:
 
 
 def _growth(series: Series) -> float:
-    """Return the factor by which the number of cases grows if all adaptive axes reach their largest size."""
+    """Return the factor by which the number of cases grows if all adaptive axes reach their largest length."""
     return math.prod(
         max(axis.refinement.at_most / len(axis.values), 1.0) for axis in series.axes if axis.refinement is not None
     )
 
 
 def _operations_and_solves(template: Template, model: Model[Any]) -> tuple[float, int]:
-    """Estimate the numbers of operations and solutions of a series from at most `SAMPLED` of its blocks."""
+    """Estimate the numbers of operations and solutions of a series from some of its blocks."""
     lengths, realisations = template.grid[:-1], template.sizes["realisation"]
     blocks = math.prod(lengths)
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)

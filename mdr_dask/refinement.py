@@ -1,8 +1,8 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Every new value lies halfway between two older values. Cases that differ in other parameters therefore use the same
-values of the axis. To test an interval, the output is predicted from older values only; the interval is halved if the
-error of the prediction exceeds the tolerance.
+Every new value lies halfway between two older values, so that cases that differ in other parameters use the same values
+of the axis. To test an interval, the output is predicted from older values only; the interval is halved if the error of
+the prediction exceeds the tolerance.
 """
 
 from __future__ import annotations
@@ -19,20 +19,18 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Number of groups of realisations for the jackknife. To estimate the scatter of a mean, the mean is computed without
-#: the first group, then without the second group, and so on. With 20 groups, the scatter is known to about 15 %.
+#: Number of groups of realisations for the jackknife, which estimates the scatter of a mean from the means without each
+#: group in turn. With 20 groups, the scatter is known to about 15 %.
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
-#: Intervals of this width, as a fraction of the axis, are not halved any further. This limits the number of values that
-#: are spent on a discontinuity.
+#: Least width of an interval, as a fraction of the axis, which limits the number of values at a discontinuity.
 FINEST = 2.0**-10
-#: An interval can pass the test only if one of its ends is a value of this level or a higher level. The values of
-#: level 3 are the eighths of the axis. The outputs at the quarters (level 2) are predicted from only three values, and
-#: such a prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
+#: Intervals are always halved until one end is a value of this level (3: the eighths of the axis). The outputs at the
+#: quarters (level 2) are predicted from only three values, and the prediction may be right by chance.
 TESTED = 3
-#: Positions in an interval at which predictions are compared with the interpolation through all values. A position is
-#: the distance from the end that was added later, as a fraction of the length of the interval.
+#: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
+#: the end that was added later, as fractions of the length of the interval.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
@@ -40,8 +38,8 @@ COMPARED = (0.0, 0.25, 0.5, 0.75)
 class Mean:
     """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
-    # Shape (1 + groups, cases...): row 0 contains the means over all realisations. Each further row contains the means
-    # without one group of realisations. A case without a successful realisation is NaN.
+    # Shape (1 + groups, cases...): the means over all realisations, then the means without each group of realisations.
+    # A case without a successful realisation is NaN.
     groups: FloatArray
     # Shape (cases...): discretisation error of the mean of each case, 0 if it is unknown.
     error: FloatArray
@@ -74,11 +72,10 @@ class Mesh:
 
     # The series, with the values of adaptive axes in the order in which they were added.
     series: Series
-    # Shape (values,): positions of the values of each adaptive axis, from 0 to 1 between the ends of the axis. The key
-    # is the index of the axis among all axes of the series.
+    # For each adaptive axis (key: its index in the series), the positions of its values, from 0 to 1.
     shares: Mapping[int, FloatArray]
-    # Shape (lengths of the non-adaptive axes..., values): a mask of the needed values of an adaptive axis, for each
-    # combination of values of the non-adaptive axes. The key is the index of the adaptive axis.
+    # For each adaptive axis, a mask of its needed values for each combination of values of the non-adaptive axes, shape
+    # (lengths of the non-adaptive axes..., values).
     used: Mapping[int, BoolArray]
 
     @classmethod
@@ -147,9 +144,8 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 class _Interval:
     """An interval of an adaptive axis whose interpolation error exceeds the tolerance or was not tested.
 
-    `case` is the index of the combination of non-adaptive values. `share` is the position of the middle of the
-    interval, and `width` the length of the interval, both as fractions of the axis. `excess` is the interpolation error
-    divided by the tolerance, at least 1.
+    `case` is the index of the combination of non-adaptive values. The middle (`share`) and the width are fractions of
+    the axis. `excess` is the interpolation error divided by the tolerance, at least 1.
     """
 
     case: tuple[int, ...]
@@ -161,9 +157,8 @@ class _Interval:
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
-    All needed cases of the mesh must have results. `means` contains the means of each output that has a tolerance. Also
-    return, for each adaptive axis, the number of combinations of non-adaptive values that still have intervals to
-    halve, although none of these intervals may be halved.
+    `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, the number of
+    combinations of non-adaptive values that miss the tolerance although none of their intervals may be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -204,7 +199,7 @@ def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
 
 
 def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
-    """Yield the intervals of an adaptive axis that were not tested, or in which interpolation misses a tolerance."""
+    """Yield the untested intervals of an adaptive axis, and those in which interpolation misses a tolerance."""
     refinement = mesh.refinement(number)
     for case in np.ndindex(mesh.used[number].shape[:-1]):
         used = {k: np.flatnonzero(mask[case]) for k, mask in mesh.used.items()}
@@ -223,14 +218,14 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
         ends = refinement.spread.at(shares)
         for k, middle in enumerate(middles.tolist()):
             if refinement.spread.whole and refinement.spread.at(np.array([middle]))[0] in (ends[k], ends[k + 1]):
-                continue  # the axis has whole numbers only, and none lies between the ends
+                continue  # no whole number lies between the ends
             is_untested = max(levels[k], levels[k + 1]) < TESTED and not np.isneginf(excess[k])
             if is_untested or excess[k] > 1.0:
                 yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))
 
 
 def _lines(mean: Mean, number: int) -> Mean:
-    """Return the same means as a table: each row is a line of cases along the axis with index `number`."""
+    """Return means as a table, in which each row is a line of cases along the axis with index `number`."""
     groups = np.moveaxis(mean.groups, number + 1, -1)
     error = np.moveaxis(mean.error, number, -1)
     rows = math.prod(error.shape[:-1])
@@ -240,8 +235,7 @@ def _lines(mean: Mean, number: int) -> Mean:
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
     """Return, for each interval, the largest interpolation error of any line, divided by the tolerance of this line.
 
-    Failed cases are left out of their line. The result is minus infinity if every line has a failed case at an end of
-    the interval.
+    The result is minus infinity if every line has a failed case at an end of the interval.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])
@@ -266,9 +260,9 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     is the largest difference between these predictions and the monotone cubic through all values, minus an allowance
     for the scatter of the realisations and the discretisation errors. It may be negative.
 
-    `places` are the ascending positions along the axis, and `levels` their levels: 0 for the ends of the axis, 1 for
-    its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in `Mean.groups`, and
-    `error`, shape (lines, values), their discretisation errors.
+    `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
+    middle, 2 at the quarters, ... The shape of the means `groups` is (1 + groups, lines, values), as in `Mean.groups`,
+    and the shape of their discretisation errors `error` is (lines, values).
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

@@ -12,22 +12,18 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: Least and largest factor by which a round multiplies the number of realisations. The least factor avoids many rounds.
-#: The largest factor is limited because a few results give only a poor estimate of the scatter.
+#: Least and largest factor by which a round multiplies the number of realisations. The least factor avoids many rounds;
+#: the largest factor is limited because a few results give only a poor estimate of the scatter.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Least number of results with which the estimated standard error alone decides whether a case stops. If cases stopped
-#: earlier, only 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
+#: Least number of results with which the estimated standard error alone decides whether a case stops. With fewer, only
+#: 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
 FEWEST = 12
-#: A case also stops if its standard error is below this fraction of the tolerance: its results are practically equal.
+#: A case also stops if its standard error is below this fraction of the tolerance.
 NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round; `count` is the number so far.
-
-    `growth` contains, for each case, the factor by which the number of realisations must grow. The factor is at most 1
-    if the case has enough realisations.
-    """
+    """Return the number of realisations after the next round, from the number so far and from `growth_needed`."""
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
         return count
@@ -46,8 +42,8 @@ def growth_needed(
     `values` and `scatter` (the standard error estimated within each realisation) have the shape (..., realisations).
     `until` limits the standard error of the mean of each output. A case has enough results if the standard error is
     within the tolerance and one of three conditions is met: there are `FEWEST` results; the standard error that follows
-    from `scatter` is within the tolerance; or the standard error is below the fraction `NEGLIGIBLE` of the tolerance.
-    The factor is 0 for a case without a successful result.
+    from `scatter` is within the tolerance; or the standard error is negligible (`NEGLIGIBLE`). The factor is 0 for a
+    case without a successful result.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -65,16 +61,13 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return the outputs that estimate the scatter of other outputs from one realisation.
-
-    The keys are the outputs with a tolerance; an output without such an estimate is left out.
-    """
+    """Return, for each output with a tolerance, the output (if any) that estimates its scatter from one realisation."""
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor by which the number of results must grow so that the error falls to the allowed error."""
+    """Return the factor by which the number of results must grow to reduce the error to the allowed error."""
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
@@ -82,7 +75,7 @@ def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[
 
 
 def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the standard error of a mean of independent realisations, given the standard error of each realisation."""
+    """Return the standard error of a mean from the standard errors of its independent realisations."""
     count = np.maximum(done.sum(axis=-1), 1)
     return np.asarray(np.sqrt((np.where(done, scatter, 0.0) ** 2).sum(axis=-1)) / count)
 
@@ -90,10 +83,7 @@ def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) ->
 def mean_and_error(
     values: NDArray[np.float64], valid: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return mean and standard error of the valid values along the last axis.
-
-    The standard error is NaN if there are fewer than two valid values.
-    """
+    """Return mean and standard error (NaN for fewer than two values) of the valid values along the last axis."""
     count = valid.sum(axis=-1)
     mean = np.where(valid, values, 0.0).sum(axis=-1) / np.maximum(count, 1)
     squares = np.where(valid, values - mean[..., None], 0.0) ** 2

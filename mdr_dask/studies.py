@@ -411,7 +411,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign. A temporary store is named after its campaign and model."""
+    """Return the path of the store of a campaign; a temporary name contains a digest of the campaign and its model."""
     if not is_temporary:
         return found.store
     made_by = f"{models.load(found.model).version} {models.source_digest(found.model)}"
@@ -442,7 +442,6 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
 
 
 def _several(words: Words) -> tuple[str, ...]:
-    """Return a text or a sequence of texts as a tuple."""
     return (words,) if isinstance(words, str) else tuple(words)
 
 

@@ -20,7 +20,7 @@ LISTED = 6
 
 @dataclass(frozen=True, repr=False)
 class Summary(Estimate):
-    """The results and the costs of a campaign. Printed, it is the text of ``mdr-dask check``.
+    """The results and the costs of a campaign; ``print`` shows the text of ``mdr-dask check``.
 
     `lines` are the axes of each series, notes, and costs; `questions` are about numbers without a unit.
     """
@@ -67,10 +67,9 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
 
 
 def _defaults(campaign: Campaign) -> list[str]:
-    """Return names and values of the parameters that have an effect but are not in the campaign file.
+    """Return names and values of defaults that are not zero, false or empty and have an effect.
 
-    Parameters whose default is zero, false or empty are left out. If only some series use a default, the names of these
-    series follow in brackets.
+    If only some series use a default, the names of these series follow in brackets.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:
@@ -161,7 +160,7 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return the costs of a study by name. Users read these names from JSON, so do not change them."""
+    """Return the costs of a study by names that users read from JSON: do not change the names."""
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,

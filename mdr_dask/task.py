@@ -22,7 +22,7 @@ from mdr_dask.models.per_case import is_interrupt, real_numbers, reason, where
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
-#: Environment variable from which child processes of this machine read the result of `kind`.
+#: Environment variable from which child processes read the result of `kind` without importing SciPy.
 KIND = "MDR_DASK_KIND_OF_MACHINE"
 
 
@@ -32,7 +32,7 @@ class Work:
 
     place: Place
     model: str
-    # Versions of the program and of the model in the driver (the process that started the run).
+    # Versions of the program and of the model in the process that started the run.
     versions: tuple[str, int]
     block: Block[Any]
     # Masks with the shape of the block: results to compute, and results to mark as not needed.
@@ -78,10 +78,7 @@ def versions(model: str) -> tuple[str, int]:
 
 
 def run_block(work: Work) -> Outcome:
-    """Compute a block and write it. Running the same task again gives the same results.
-
-    Raise ClusterError if this worker has another version of the program than the driver.
-    """
+    """Compute a block and write it; raise ClusterError if this worker has another version of the program."""
     if versions(work.model) != work.versions:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
@@ -116,11 +113,9 @@ def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
     return tuple(np.bincount(status[work.wanted | work.spared], minlength=len(Status)).tolist())
 
 
-#: Errors that come from a fault of the machine and not from a case: for example, the cache of the compiler is broken, a
-#: disk is full, or a library is missing.
+#: Errors from a fault of the machine, such as a full disk or a missing library, and not from a case.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Longer messages are cut to this number of characters before they are stored, because every failed result has a
-#: message.
+#: Largest number of characters of a stored message; every failed result has a message.
 LONGEST_MESSAGE = 1000
 
 
@@ -154,7 +149,7 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 
 
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
-    """Return the checked result of a model that the user wrote; results with invalid values are marked as failed.
+    """Return the result of a model that the user wrote, with invalid values marked as failed.
 
     Raise TypeError or ValueError if the result lacks a declared output, or if a shape or a status is not as declared.
     """
@@ -196,7 +191,7 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
 
 
 def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
-    """Return arrays of NaN in the shapes of the outputs, for cases without results."""
+    """Return arrays of NaN in the shapes of the outputs."""
     extra = model.coordinates(block.parameters)
     sizes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
     return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
@@ -279,7 +274,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
 
 
 def _place(work: Work, case: int, number: int) -> list[int]:
-    """Return the indices of a result in the ledger, from the number of its case and of its realisation in the block."""
+    """Return the indices in the ledger of a result, from the numbers of its case and realisation in the block."""
     region = work.place.region
     shape = [part.stop - part.start for part in region]
     inside = [int(offset) for offset in np.unravel_index(case, shape[:-1])] if len(shape) > 1 else []
@@ -293,10 +288,7 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Name the processor and the numerical libraries, because the last digits of results may depend on them.
-
-    Child processes read this text from the environment variable `KIND`, so that they need not import SciPy.
-    """
+    """Return the names of the processor and the numerical libraries, on which the last digits of results may depend."""
     if KIND in os.environ:
         return os.environ[KIND]
     from importlib.metadata import version
@@ -312,10 +304,7 @@ def kind() -> str:
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit the libraries for linear algebra to one thread until the context ends.
-
-    Results then do not depend on the number of threads.
-    """
+    """Limit the libraries for linear algebra to one thread, so that results do not depend on the number of threads."""
     import scipy.linalg  # noqa: F401  (loads the BLAS library of SciPy, which must be loaded before it can be limited)
     from threadpoolctl import threadpool_limits
 
@@ -324,7 +313,7 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Mark the results of a task as failed without computing them, because computing them crashes the process."""
+    """Mark the results of a task as failed without computing them."""
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED

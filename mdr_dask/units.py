@@ -16,9 +16,8 @@ from mdr_dask.errors import distinguishable, similar
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: Units in the syntax of pint. Pint's own list of 900 units takes ten times as long to load. Pint's list
-#: also contains units with one-letter names (``c``, ``e``, ``M``), which in a campaign are more likely to be mistakes.
-#: In the list below, unlike in pint's own list, angles have a dimension.
+#: Units in the syntax of pint; angles have a dimension. Pint's own list takes ten times as long to load, and contains
+#: units with one-letter names (``c``, ``e``, ``M``), which in a campaign are more likely to be mistakes.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -113,13 +112,12 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Texts with more characters than `_MOST_LETTERS`, and exponents of more than two digits, are refused, because pint may
-#: need an extremely long time to parse them.
+#: Pint may need extremely long to parse texts of more than `_MOST_LETTERS` characters and exponents of three digits.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
-#: A number before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``, and a factor of pure numbers, as in
-#: ``10^3`` or ``x 1000``. A number alone, as in ``mu (10)``, is no factor: it may be a condition.
+#: A factor before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``, or without a unit, as in ``10^3`` or
+#: ``x 1000``. The number in ``mu (10)`` is no factor: it may be a condition.
 _POWER = r"10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?e[+-]?\d+"
 _FACTOR = re.compile(
     rf"([x×*]\s*\d+|{_POWER})\Z|[x×*]?\s*({_POWER}|\d+(?:\.\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE
@@ -133,7 +131,7 @@ _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
 
 
-#: The unit that a message suggests instead of an unknown unit is one of these.
+#: Units that a message may suggest instead of an unknown unit.
 COMMON = (
     "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm "
     "inch percent meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute "
@@ -145,8 +143,7 @@ COMMON = (
 def to_si(value: str, unit: str) -> float:
     """Convert a number with its unit, such as ``"20 mm"``, to a coherent SI unit; raise ValueError with a message.
 
-    A number without a unit is in SI. Decimal units are converted with correct rounding: ``"1.1 mm"`` is 0.0011, not 1.1
-    x 0.001.
+    A number without a unit is in SI. Decimal units are rounded correctly: ``"1.1 mm"`` is 0.0011, not 1.1 x 0.001.
     """
     match = _QUANTITY.match(value)
     if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):
@@ -197,10 +194,7 @@ _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
 def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
-    """Return a quantity for a reader: ``0.5 mm/s`` for 5e-4 m/s, ``-20 degC`` for 253.15 K.
-
-    It is printed in the unit `written`, or in the SI unit with a suitable prefix.
-    """
+    """Return a quantity in the unit `written`, or as ``0.5 mm/s`` for 5e-4 m/s, ``-20 degC`` for 253.15 K."""
     if written:
         factor, zero = conversion(written, unit)
         return f"{(value - zero) / factor:.{digits}g} {written}"
@@ -224,7 +218,7 @@ def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
 
 
 def seconds(duration: float) -> str:
-    """Return a duration for a reader: ``0.5 s``, ``2 min 5 s``, ``3 h 20 min``."""
+    """Return a duration in s as text: ``0.5 s``, ``2 min 5 s``, ``3 h 20 min``."""
     if duration < 60:
         return f"{duration:.2g} s" if duration < 10 else f"{duration:.0f} s"
     minutes, rest = divmod(round(duration), 60)
@@ -243,7 +237,7 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
     A number with a dimension is doubtful if it differs from the first of the `usual` values by more than 3 decades. Any
-    number is also doubtful if the unit of one of the `usual` values brings it nearer to the first of these values.
+    number is also doubtful if the unit of one of the `usual` values brings it nearer to the first usual value.
     """
     if value == 0:
         return False
@@ -256,13 +250,13 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     """Return a number with the unit in which it was probably meant, or an empty text.
 
-    Among the units of the `usual` values, this is the unit that brings the number nearest to the first usual value. The
-    text is empty if the number then still differs from this value by more than 3 decades.
+    Among the units of the `usual` values, the unit that brings the number nearest to the first usual value is chosen,
+    but none if the number then still differs from this value by more than 3 decades.
     """
     found = {}
     for each in usual:
         meant = f"{value:g} {unit_behind(each)}"
-        with suppress(ValueError):  # raised if the converted number is too large
+        with suppress(ValueError):  # the converted number is too large
             found[meant] = _decades(to_si(meant, unit), unit, usual[0])
     nearest = min(found, key=lambda meant: found[meant], default="")
     return nearest if nearest and found[nearest] <= _FAR + 1e-9 else ""
@@ -274,7 +268,7 @@ def _decades(value: float, unit: str, usual: str) -> float:
 
 
 def example_unit(unit: str) -> str:
-    """Return a common unit of the quantity that has a given SI unit: MPa for Pa."""
+    """Return a common unit instead of an SI unit, such as MPa for Pa."""
     return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
 
 
@@ -295,7 +289,7 @@ def _may_be_unit(text: str) -> bool:
 
 
 def scaled(number: str, factor: float) -> float:
-    """Return the product of a number and a factor; it is correctly rounded if the factor is a power of ten."""
+    """Return the product of a number and a factor, rounded correctly if the factor is a power of ten."""
     power = round(math.log10(factor))
     if math.isclose(factor, 10.0**power, rel_tol=1e-12):
         return float(Decimal(number).scaleb(power))
@@ -304,7 +298,7 @@ def scaled(number: str, factor: float) -> float:
 
 @lru_cache(maxsize=1)
 def registry() -> UnitRegistry[Any]:
-    """Return the registry of pint for the units in `DEFINITIONS`; pint is imported when it is needed."""
+    """Return the registry of pint for the units in `DEFINITIONS`."""
     from pint import UnitRegistry
 
     units: UnitRegistry[Any] = UnitRegistry(None)
@@ -385,10 +379,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint with the known unit whose spelling is nearest to a word.
-
-    If `unit` is given, only known units of the same dimension are considered.
-    """
+    """Return a hint with the known unit (of the dimension of `unit`, if given) whose spelling is nearest to a word."""
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"
