@@ -7,8 +7,7 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules with a tuple ``FITS``. For each module, the models whose stores its fits accept; an empty tuple means all
-#: models.
+#: Modules with a tuple ``FITS``, and the models whose stores its fits accept; an empty tuple means all models.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),

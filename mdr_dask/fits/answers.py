@@ -94,8 +94,8 @@ def still_wide(
 ) -> dict[str, xr.DataArray]:
     """Return, for each series, whether the interval of a constant is too wide and more realisations would help.
 
-    Realisations do not help if the part of the half width that is due to scatter is within the tolerance, and the total
-    half width would exceed the tolerance even with `at_most` realisations.
+    More realisations do not help if the part of the half width that is due to scatter is within the tolerance, and the
+    total half width would exceed the tolerance even with `at_most` realisations.
     """
     found = half_widths(fit, constant, groups)
     wide = {name: is_wide(*both, tolerance) for name, both in found.items()}
@@ -116,8 +116,8 @@ def cases_behind(
     """Return the cases of the series `name` that influence constants whose interval is too wide.
 
     `wide` marks the constants with such an interval. Along each dimension of the series that `wide` lacks, neighbouring
-    cases form groups. The results of one group are shifted, and the fit is repeated. A case is chosen if, along each
-    such dimension, the shift of its group changes a marked constant.
+    cases form groups. The results of one group are shifted, and the fit is repeated. A case is chosen if, along every
+    dimension with groups, the shift of its group changes a marked constant.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}

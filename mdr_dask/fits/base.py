@@ -124,8 +124,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p), which are exponents or logarithms of factors; `left` returns data
     minus law. If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by
-    the residuals, which widens the intervals. A constant is NaN if the function `undetermined` marks it at the fitted
-    or at the `stated` constants.
+    the residuals, so that the intervals become wider. A constant is NaN if the function `undetermined` marks it at the
+    fitted or at the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)

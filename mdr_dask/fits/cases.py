@@ -30,8 +30,8 @@ def each(
 ) -> xr.Dataset:
     """Fit a law to the cases along some dimensions, for each combination of values along the other dimensions.
 
-    One fit uses all cases along the dimensions that the function `inner` returns. The fit needs all of `outputs`. The
-    first output must have no dimensions except the axes of the study and ``realisation``.
+    One fit uses all cases along the dimensions that the function `inner` returns. The first output must have no
+    dimensions except the axes of the study and ``realisation``.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -158,8 +158,8 @@ def nonlinear(
     """Fit a law to a stack of logarithms, and test the law with the stated and with the fitted constants.
 
     The function `model` takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1,
-    cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row; the
-    constants of the other rows follow by linearisation.
+    cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row of `logs`;
+    the constants of the other rows follow by linearisation.
     """
 
     def misfit(constants: FloatArray) -> FloatArray:

@@ -94,8 +94,8 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
 
-    At this velocity and at the next one, the values of mu / v differ by less than the fraction `WITHIN`. The index need
-    not be 0: the time stepping of the original papers makes friction at very low velocities too large.
+    Friction counts as proportional if mu / v at the next velocity differs by less than the fraction `WITHIN`. The index
+    need not be 0: the time stepping of the original papers makes friction at very low velocities too large.
     """
     if velocity.size == 1:
         return 0

@@ -208,7 +208,7 @@ TRENDS = {
 
 
 def _jump_linearity(data: xr.Dataset) -> Variables:
-    """Fit straight lines to zeta and xi (see `NUMBERS`) against dv / v_1. By eq. 4.8, the lines are horizontal."""
+    """Fit straight lines, horizontal by eq. 4.8, to zeta and xi (see `NUMBERS`) against dv / v_1."""
     if np.unique(data["velocity_change"]).size < 3:
         sizes = np.unique(data["velocity_change"]).size
         raise FitError(f"expected jumps dv / v_1 of three sizes or more, got {sizes}")

@@ -39,7 +39,7 @@ class Residuals(NamedTuple):
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Return a sentence on whether the model explains the measured points; it begins with *yes*, *no* or *not tested*.
+    """Return a sentence (*yes*, *no* or *not tested* with a reason) on whether the model explains the measured points.
 
     The model is *not tested* if the errors would hide any misfit, or if there are too few points.
     """

@@ -46,8 +46,8 @@ class Predicted(NamedTuple):
 class Prediction:
     """The output at the measured points and the errors of the output, interpolated over the unknowns of a study.
 
-    `unknowns` contains the computed values of each unknown, ascending. If `logarithmic`, the logarithm of the output is
-    interpolated.
+    `unknowns` contains the computed values of each unknown, ascending. If `logarithmic` is true, the logarithm of the
+    output is interpolated.
     """
 
     unknowns: Mapping[str, FloatArray]

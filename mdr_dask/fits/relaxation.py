@@ -62,7 +62,7 @@ class Relaxation(NamedTuple):
 
 
 def widths(time: FloatArray) -> FloatArray:
-    """Return the weights of the values at these times in an integral by the trapezoidal rule."""
+    """Return the weights of values at the times `time` in an integral by the trapezoidal rule."""
     step = np.diff(time)
     weights: FloatArray = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
     return weights
@@ -77,8 +77,9 @@ def tried_rates(time: FloatArray) -> FloatArray:
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each trace, shape (n, m), by weighted least squares; return rates and amplitudes.
 
-    Each of the `tried_rates` has its own best amplitude. A parabola through the sums of squares at the best rate and
-    at its two neighbours refines the rate to a relative error of about 1e-4.
+    The sum of squares is computed for each of the `tried_rates`, with the best amplitude for this rate. A parabola
+    through the sums of squares at the best rate and at its two neighbours refines the rate to a relative error of about
+    1e-4.
     """
     logs = np.log(tried_rates(time))
     shapes = np.exp(-np.exp(logs)[:, None] * time)
@@ -232,7 +233,7 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return an array with one column for each case: the stack of the rates of the case.
+    """Return an array whose columns are the stacks of the rates of the cases.
 
     Shorter stacks are padded at their end with their first value.
     """

@@ -184,7 +184,7 @@ def collapse(
 
     The shifts are fitted to the first of the stacked `rows`; the shifts for the other rows follow by linearisation.
     `curve` contains, for each point, the index of its curve. One search begins with the shifts `start`, another with
-    zero shifts; the better result is used. Without `vertical`, curves are shifted along ln(velocity) only.
+    zero shifts; the better result is used. If `vertical` is false, curves are shifted along ln(velocity) only.
     """
     from scipy.optimize import OptimizeResult, least_squares
 

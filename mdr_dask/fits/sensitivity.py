@@ -100,8 +100,8 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 def _is_saltelli(columns: FloatArray) -> bool:
     """Return whether the cases are those of Saltelli's design.
 
-    In Saltelli's design, each group of cases consists of a point a, a point b and, for each input, a copy of point a in
-    which this input has the value from point b.
+    Each group of cases in this design consists of a point a, a point b and, for each input, a copy of point a in which
+    this input has the value from point b.
     """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
@@ -138,9 +138,9 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
 
-    The first-order index is the mean of two estimates: one for random points, and one for points that fill space
-    evenly, such as a Sobol sequence. The interval extends from the lower end of the first interval to the upper end of
-    the second.
+    The first-order index is the mean of an estimate for random points and an estimate for points that fill space
+    evenly, such as a Sobol sequence. The interval extends from the lower end for random points to the upper end for
+    evenly spread points.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
