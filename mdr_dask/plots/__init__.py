@@ -31,9 +31,7 @@ def available(model: str) -> dict[str, Plot]:
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return all figures for stores of a model, indexed by name. If no figure was written for this model, each output
-    that varies with a parameter gets a figure.
-    """
+    """Return the figures of a model; if it has no figures of its own, also one for each output that varies."""
     from mdr_dask.plots.view import figure_of, varied
 
     known = available(model)

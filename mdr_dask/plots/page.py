@@ -36,10 +36,10 @@ COLUMN, TALLEST = 0.085 / INCH, 0.23 / INCH
 class Page:
     """The requested appearance of a figure.
 
-    `width` and `height` are in inches; without a height, the height follows from the content. If `title` is None, a
-    description of the figure is the title, or there is no title if a width is requested. `style` is a style or style
-    file of matplotlib, and `cycle` holds the colours, lines and markers of this style. `units` maps names of quantities
-    to the requested units, and `symbols` maps names of coordinates to their labels. `used` collects the names of all
+    `width` and `height` are in inches; without a height, the height follows from the content. If `title` is None, the
+    title is a description of the figure, or empty if a width is requested. `style` is a style or style file of
+    matplotlib, and `cycle` holds the colours, lines and markers of this style. `units` maps names of quantities to the
+    requested units, and `symbols` maps names of coordinates to their labels. `used` collects the names of all
     quantities that figures have shown.
     """
 
