@@ -52,12 +52,12 @@ class DataFile(BaseModel):
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note on a table: its columns and the range of each column. For other files, return no note."""
+        """Return a note on the columns of a table and their ranges; for other files, return no note."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """Call `check` if a campaign is being read. Convert a DataError to the ValueError that pydantic expects."""
+    """Call `check` if a campaign is being read; convert a DataError to the ValueError that pydantic expects."""
     if info.context is not None:
         try:
             check()

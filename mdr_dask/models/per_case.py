@@ -36,8 +36,8 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     returns this error, as ``<output>_error``.
 
     A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
-    real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A negative error is
-    a failure, too.
+    real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A case also fails if an
+    error is negative.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -68,7 +68,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
 
 
 def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
-    """Solve a case. If the solution takes longer than the time limit, an alarm interrupts it."""
+    """Solve a case, and interrupt the solution by an alarm after the time limit."""
     if time_limit is None:
         return solve(parameters, random)
     signal.setitimer(signal.ITIMER_REAL, time_limit)

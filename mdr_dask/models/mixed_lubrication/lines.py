@@ -60,8 +60,8 @@ class _Random:
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).
 
-        For each wavelength, from the longest to the shortest, one random phase is drawn for each line. Therefore the
-        longer waves stay the same if shorter waves are added.
+        For each wavelength, from the longest to the shortest, one random phase is drawn for each line, so that longer
+        waves stay the same if shorter waves are added.
         """
         from mdr_dask.physics.surfaces.roughness import phase_factors
         from mdr_dask.physics.surfaces.splines import closest
@@ -91,7 +91,7 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces; heights in m. Realisations use a surface's files in turn."""
+    """Two lines, in m, with the spectra of measured surfaces; realisations use the files of a surface in turn."""
 
     surface_1: Surface
     surface_2: Surface

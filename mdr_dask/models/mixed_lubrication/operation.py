@@ -16,7 +16,7 @@ from mdr_dask.physics.outcome import Outcome
 
 
 class NoFilmError(Exception):
-    """Raised if the film of a case cannot be computed. The message states the reason."""
+    """Raised if the film of a case cannot be computed."""
 
 
 class Film(NamedTuple):

@@ -148,7 +148,7 @@ def _realise(
 
 
 def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:
-    """Yield a warning for each assumption of the model that a case violates, if it concerns the requested outputs."""
+    """Yield a warning for each assumption of the model that a case violates."""
     if operation.warning:
         yield operation.warning
     if operation.squares < 1:
@@ -166,8 +166,8 @@ def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:
 def operations(block: Block[MixedLubrication]) -> float:
     """Return the approximate number of operations of a block. Only the two coarsest grids of every case are counted.
 
-    Per point, a line needs about 40 operations (Fourier transform and spline), and a case 10 (clusters); with sliding,
-    every point lies in `WINDOWS` windows or more. An EHL film needs about ten solutions to share the load.
+    Each point needs about 40 operations for a line, and 10 for a case. With sliding, each point lies in `WINDOWS`
+    windows or more. An EHL film needs about ten solutions to find the load shares.
     """
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     points_of = np.empty(block.cases)

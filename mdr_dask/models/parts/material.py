@@ -146,10 +146,7 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the relaxation times at the material's temperature, divided by the relaxation times of the data.
-
-    Return None if no law or no temperature is given.
-    """
+    """Return the relaxation times at the material's temperature, divided by the relaxation times of the data."""
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
@@ -214,7 +211,7 @@ def fit_error(material: Material | None) -> float:
 def frequencies(material: Material) -> tuple[float, float] | None:
     """Return the lowest and highest angular frequency, in rad/s, of the data of a power law or a table.
 
-    The frequencies are shifted to the material's temperature. Return None for other materials.
+    The frequencies are shifted to the material's temperature.
     """
     fit = _fit_of(material)
     if fit is None:

@@ -95,8 +95,8 @@ class Moduli:
     """One curve of moduli: angular frequency in rad/s, storage and loss modulus in Pa.
 
     `temperature` is the temperature of the curve in K, and `measured` are the lowest and the highest temperature of the
-    table in K. `temperature` and `measured` are None if neither the table nor the user states a temperature.
-    `superposed` describes how the curves of several temperatures were superposed.
+    table in K. Without a stated temperature, `temperature` and `measured` are None. `superposed` describes how the
+    curves of several temperatures were superposed.
     """
 
     omega: FloatArray
@@ -111,8 +111,7 @@ class Moduli:
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the shear moduli of a table at one temperature.
 
-    The curves of several temperatures are superposed, unless the user chooses one temperature. Raise DataError if the
-    curves cannot be superposed.
+    The curves of several temperatures are superposed, unless the user chooses one temperature.
     """
     found = _as_measured(chosen, law)
     divisor = 1.0 if chosen.poisson_ratio is None else 2 * (1 + chosen.poisson_ratio)
@@ -240,7 +239,7 @@ def _require_overlap(moduli: FloatArray, member: IntArray, levels: FloatArray) -
         np.array([find(moduli[:, member == number], axis=1) for number in range(levels.size)]).T
         for find in (np.min, np.max)
     )
-    gap = np.log10(low[:, :, None] / high[:, None])  # of each modulus, for all pairs of curves
+    gap = np.log10(low[:, :, None] / high[:, None])  # gaps in both moduli, for all pairs of curves
     apart = np.all(np.maximum(gap, gap.transpose(0, 2, 1)) > APART, axis=0)
     order = np.argsort(low[0])
     for place in range(1, order.size):

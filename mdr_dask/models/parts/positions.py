@@ -128,8 +128,8 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Also return remarks.
 
     The largest number is replaced if its distance from the next smaller number exceeds the range of all numbers between
-    the smallest and the largest. The same applies to the smallest number. If such a number occurs only once, it may be
-    the height of a narrow groove or peak; it is replaced only if its distance exceeds `FAR_ALONE` times this range. A
+    the smallest and the largest. The same applies to the smallest number. A number that occurs only once may be the
+    height of a narrow groove or peak, and is replaced only if its distance exceeds `FAR_ALONE` times the range. A
     surface such as a grating, with at most `FEW_LEVELS` different heights between the smallest and the largest number,
     is left unchanged.
     """

@@ -63,8 +63,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface and random phases.
 
-    If the surface has several files, the realisations use the files in turn. The scatter between realisations then
-    includes the scatter between files.
+    If the surface has several files, the realisations use the files in turn, so that their scatter includes the scatter
+    between files.
     """
 
     surface: Surface
@@ -99,7 +99,7 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The measured profile of a file. All realisations are the same line."""
+    """The measured profile of a file, which is the same line in all realisations."""
 
     profile: ProfileFile
     is_random = False

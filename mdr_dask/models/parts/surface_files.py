@@ -47,7 +47,7 @@ class Found(NamedTuple):
     """The spectrum C2D of a file within the range of the data.
 
     `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found. `error` contains
-    the standard errors of log C2D if the spectrum was computed from that of straight profiles.
+    the standard errors of log C2D if the spectrum was computed from the spectrum of straight profiles.
     """
 
     spectrum: Spectrum

@@ -43,7 +43,7 @@ from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
 OPERATIONS_MARCHED = 20  # operations of a jump, divided by the number of nodes and by the number of steps per decade
-# operations for one element in one time step of a history, without the modes of the solid and for each mode
+# operations for one element in one time step of a history: without modes of the solid, and for each mode
 OPERATIONS_FOLLOWED, OPERATIONS_A_MODE = 300, 25
 
 #: Names of the outputs for which errors are estimated.
@@ -177,9 +177,9 @@ class _Group:
     def _floor(self, found: _Found, name: str) -> FloatArray:
         """Return the floor of an output for every case (see `missed_accuracy`).
 
-        The floor of a depth is the rms height, which is the unit of the depths here. If friction is zero within its
-        error, as for a body at rest, the floor is the largest absolute friction of the case. The floor of any other
-        friction is 0.
+        The floor of a depth is 1, because depths are divided by the rms height. If friction is zero within its error,
+        as for a body at rest, the floor is the largest absolute friction of the case. The floor of any other friction
+        is 0.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -230,7 +230,7 @@ class _Marched(_Group):
 
 
 class _Followed(_Group):
-    """One case that is computed from the motion of all elements: any history, solid and indenter."""
+    """One case with any history, solid and indenter, computed from the motion of all elements of the foundation."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the case on up to three grids, with time steps that are proportional to the node spacing."""
