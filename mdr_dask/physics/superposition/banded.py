@@ -178,14 +178,11 @@ def _add_ties(
     corner: FloatArray,
     right: FloatArray,
 ) -> None:
-    """Add the contributions of the points of a channel to the border, the corner and the right side of the offsets.
-
-    The contributions to border and right side are negative, because offsets are subtracted from the spline.
-    """
+    """Add the contributions of the points of a channel to the border, the corner and the right side of the offsets."""
     for p in range(first.size):
         k = member[p]
         corner[k, 0] += weight
-        right[k] -= weight * y[p]
+        right[k] -= weight * y[p]  # negative, because offsets are subtracted from the spline
         for a in range(ORDER):
             border[first[p] + a, k] -= weight * value[p, a]
 

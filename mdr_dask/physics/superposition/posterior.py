@@ -59,12 +59,11 @@ FARTHEST = 8.0
 class Curves:
     """Points of all curves; abscissae are divided by the median width of a curve, ordinates are in decades.
 
-    The origin of `x` is such that the smallest ``x + shift`` is near zero. `member` is the index of the curve of each
-    point, and `height` the median height of a curve in each channel. `splines` is the number of spline coefficients of
-    each channel. `offset` describes the prior of the standard deviation s of the vertical offsets: the median of s
-    in decades, and the standard deviation of ln s. Without offsets, `offset` is None. If `drifting` is True, the
-    offsets change from curve to curve by steps. A step is a mean step plus a scatter; the prior standard deviation of
-    the mean step is `TREND` times that of the scatter.
+    `member` is the index of the curve of each point, and `height` the median height of a curve in each channel.
+    `splines` is the number of spline coefficients of each channel. `offset` describes the prior of the standard
+    deviation s of the vertical offsets: the median of s in decades, and the standard deviation of ln s. Without
+    offsets, `offset` is None. If `drifting` is True, the offsets change from curve to curve by steps. A step is a mean
+    step plus a scatter; the prior standard deviation of the mean step is `TREND` times that of the scatter.
     """
 
     x: FloatArray

@@ -38,8 +38,8 @@ def superpose_twice(
 ) -> TwoShifts:
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
-    First all curves are superposed with independent factors. Then a and b are fitted to these factors, weighted by
-    their covariance; to first order, the result is as if a and b were fitted to the curves directly. The factors are
+    First all curves are superposed with independent factors. Then a and b are fitted to the independent factors, with
+    the inverse covariance as weight; to first order, this is the same as a direct fit to the curves. The factors are
     zero at the middle value of each quantity. If a `reference` is given, the factors of the first quantity are zero at
     the value nearest to the reference instead.
     """

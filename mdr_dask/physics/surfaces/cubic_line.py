@@ -85,10 +85,10 @@ def without_kinks(line: CubicLine) -> CubicLine:
 class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
-    A periodic line starts in the cell of its highest point. Heights are relative to this point, so that small depths
-    under light loads are not lost to rounding. `peak` is the largest height in each cell; `mean` and `stretch` are the
-    integrals of the height and of the squared slope over each cell. A period begins at the highest point: `start` is
-    the position of this point in cell 0, and `top` is its height.
+    A periodic line starts in the cell of its highest point. Heights are relative to the highest point, so that small
+    depths under light loads are not lost to rounding. `peak` is the largest height in each cell; `mean` and `stretch`
+    are the integrals of the height and of the squared slope over each cell. A period begins at the highest point:
+    `start` is the position of this point in cell 0, and `top` is its height.
     """
 
     height: FloatArray
@@ -218,10 +218,8 @@ def _turned(
 
 
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
-    """Return whether the line has more than two nodes per shortest wave.
-
-    The sum of the squared slopes at the nodes is then close to the integral of the squared slope over the cells.
-    """
+    """Return whether the line has more than two nodes per shortest wave."""
+    # the sum of the squared slopes at the nodes is then close to the integral over the cells
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 

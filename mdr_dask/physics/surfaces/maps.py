@@ -192,7 +192,7 @@ class MapSpectrum:
 
         The anisotropy is the larger of the second and the fourth angular harmonic of the power. The rms of each
         harmonic is taken over octaves of the wave number, without waves that are only noise. Octaves with few waves are
-        left out, because their harmonics have much scatter. The part that scatter alone may cause is subtracted.
+        left out, because their harmonics have much scatter. The harmonics that scatter may cause are subtracted.
         """
         is_rough = self.wavenumber <= noise_limit(self.binned()) * (1 + 1e-9)
         there = np.flatnonzero(significant(self.wavenumber, self.density) & is_rough)

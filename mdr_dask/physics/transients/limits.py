@@ -70,10 +70,10 @@ class SteadyLimits(NamedTuple):
     `before`, `at` and `after` are the drag F_x / (4 G L) in steady sliding at v_1, just after the jump, and in steady
     sliding at v_2. The unit of the drag is the unit of height squared divided by the unit of length. Just after the
     jump, `rate` is the derivative of the depth with respect to t / tau, and `tilt` is the derivative of the drag with
-    respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values. `first` contains the
-    contact patches before the jump, and `slower` the patches in steady sliding at the lower of the two velocities; both
-    are None if one of the two steady states was not found. `is_full` states whether the whole line is in contact in
-    both steady states.
+    respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values, before and after the
+    jump. `first` contains the contact patches before the jump, and `slower` the patches in steady sliding at the lower
+    of the two velocities; both are None if one of the two steady states was not found. `is_full` states whether the
+    whole line is in contact in both steady states.
     """
 
     before: float
@@ -94,7 +94,7 @@ def steady_limits(
 ) -> list[SteadyLimits]:
     """Solve the steady states before and after jumps on one line, and the states just after the jumps.
 
-    At the instant of a jump the displacements and the depth do not change. The rate of the depth changes, and elements
+    At the instant of a jump, displacements and depth do not change, but the rate of the depth changes, and elements
     whose force would become negative separate.
 
     Loads are F_N / (4 G L), in the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2 tau / L.

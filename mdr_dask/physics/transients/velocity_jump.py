@@ -165,7 +165,7 @@ class _Relaxation(NamedTuple):
         """March from one steady state to the next.
 
         The depth may leave the interval between the steady depths by the length of this interval. If the depth leaves
-        the interval by more, the march is repeated with 4 times, and then with 16 times the length as margin.
+        the interval by more, the march is repeated with a margin of 4, and then 16, times the length.
         """
         for widening in (1, 4, 16):
             marching, found, work = self.begun(widening * self.change)

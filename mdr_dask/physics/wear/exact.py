@@ -232,15 +232,12 @@ def _moved(profile: Profile, c: float, rise: float) -> float:
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
-    """Return an upper bound of the contact radius under constant force.
-
-    At this radius, the virgin profile is at least as high as the largest possible depth.
-    """
+    """Return an upper bound of the contact radius under constant force."""
     abscissa, weight = gauss(64)
     x = stick_radius + (1.0 - stick_radius) * abscissa
     slipping = (1.0 - stick_radius) * float((1.0 - profile.image(x)) @ weight)
     deepest = 1.0 + slipping / stick_radius
-    radius = 1.0 + 4.0 * (1.0 - stick_radius)
+    radius = 1.0 + 4.0 * (1.0 - stick_radius)  # enlarged until the profile is as high as the largest possible depth
     while float(profile.height(np.array([radius]))[0]) < deepest:
         radius *= 1.5
     return radius

@@ -38,7 +38,7 @@ def history(
 
     The error is about proportional to the cell width, or, once the image has a jump, to the square root of the cell
     width. `reach` is the largest radius of the grid in units of a0. If `errors` is True, the errors are estimated from
-    two more solutions, with 1/2 and 1/4 of this number of cells.
+    two more solutions, with 1/2 and 1/4 of the cells.
     """
     length = min(reach, profile.largest_radius)
     fine, *rough = (

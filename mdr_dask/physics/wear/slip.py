@@ -32,9 +32,9 @@ _ABSCISSA, _WEIGHT = gauss(3)
 class Moment:
     """The contact at one `time`, which is the number of cycles N in partial slip and the sliding path s in gross slip.
 
-    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The next unknown is the
-    difference of r^2 between the edge and the inner border, divided by its value in the virgin contact. The other
-    unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
+    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The unknown after the image
+    is the difference of r^2 between the edge and the inner border, divided by its value in the virgin contact. The
+    other unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
     """
 
     time: float

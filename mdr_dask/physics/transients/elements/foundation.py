@@ -60,8 +60,7 @@ class Lapse(NamedTuple):
     """A duration, the factors of decay during this time, and work arrays for one element.
 
     `decay` and `fades` are the factors by which the modes and the strains of the Prony terms decay; `part_decay` and
-    `part_fades` are the factors for a part of the duration. `modes` and `strains`, shape (1, terms), belong to one
-    element.
+    `part_fades` are the factors for a part of the duration.
     """
 
     time: float
@@ -206,7 +205,7 @@ def advance(
     terms: FloatArray,
     i: int,
 ) -> tuple[float, bool]:
-    """Move one element through a duration; return its displacement and contact at the end. Its strains are overwritten.
+    """Move one element through a duration, with its strains `terms`; return displacement and contact at the end.
 
     The depth plus height of the line changes from w0 to w1; u0 and `touching` are displacement and contact at the
     start. `part` and `leaves` are results of :func:`release` for an element in contact. `after` is the displacement at

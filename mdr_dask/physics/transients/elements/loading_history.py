@@ -36,7 +36,7 @@ class Response(NamedTuple):
     """Forces and depth at every instant of a loading history, and the state of the elements at the end.
 
     The drag is F_x / (4 G L), in the unit of height squared divided by the unit of length. `contact` is the fraction of
-    the line in contact. Another history can continue from `state`.
+    the line in contact.
     """
 
     drag: FloatArray

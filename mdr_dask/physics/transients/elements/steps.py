@@ -75,7 +75,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
     """Return the depth d at which the mean displacement is `mean`, and whether this depth was found.
 
     The displacement of an element is max(d + h, free), with the height h of the line (`under`), and the displacement
-    `free` of the element without contact. The mean is a convex, increasing function of d.
+    `free` of the element without contact. The mean displacement is a convex, increasing function of d.
     """
     n = under.size
     for _ in range(200):
