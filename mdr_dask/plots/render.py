@@ -312,13 +312,23 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
     width, asked = figure.get_figwidth(), page.current()
     most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 3
     size = mpl.rcParams["legend.fontsize"]
+    names = {key.label.rpartition(" = ")[0] for key in keys}
+    title = names.pop() if len(keys) > 1 and len(names) == 1 else ""
+    keys = [replace(key, label=key.label.removeprefix(f"{title} = ")) for key in keys] if title else keys
     kept = [replace(key, label=_broken(figure, key.label, 0.8 * width, size)) for key in keys]
     while True:
         rest = len(keys) - len(kept)
         handles = [_handle(key) for key in kept]
         handles += [_handle(Key(f"and {rest} more, see the table", "none"))] if rest else []
         for columns in range(min(len(handles), 6), 0, -1):
-            legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
+            legend = figure.legend(
+                handles=handles,
+                title=_broken(figure, title, 0.8 * width, size),
+                loc="outside lower center",
+                ncols=columns,
+                frameon=False,
+            )
+            legend.get_title().set_fontsize(size)
             extent = legend.get_window_extent(figure.canvas.get_renderer())  # type: ignore[attr-defined]
             if extent.width <= width * figure.dpi or columns == 1:
                 break

@@ -191,10 +191,10 @@ def _unfit(data: xr.Dataset, view: View, output: str) -> str:
             hint = did_you_mean(name, known)
             return f"no axis {name!r}{hint if 'mean' in hint else ''}; {others}"
     if rest := [dim for dim in own if dim not in view.along]:
-        return f"{output} varies along {rest[0]}: --over {rest[0]}, or --select {rest[0]}=VALUE"
+        return f"{output} varies along {rest[0]}: draw it over {rest[0]}, or select {rest[0]}=VALUE"
     dims = [(name, curves.along_dim(data, name, output)) for name in (*view.along, view.by, view.panels) if name]
     if view.panels and _is_sampled(data, dims[-1][1]):
-        return f"every case of a sampled study has its own {view.panels}: use --by {view.panels} instead of --panels"
+        return f"every case of a sampled study has its own {view.panels}: use it as 'by' instead of 'panels'"
     for name, dim in dims:
         if [each for _, each in dims].count(dim) > 1 and not _is_sampled(data, dim):
             return f"{name} is requested twice: curves, panels and axes need different parameters"
@@ -374,7 +374,7 @@ def _families(series: Mapping[str, xr.Dataset], view: View, output: str) -> dict
     if len(series) > 1 and first > colours.most():
         raise DataError(
             f"expected at most {colours.most()} curves of several series in a panel, got {first}: "
-            "draw fewer curves with --select, or leave out --panels"
+            "select fewer curves, or leave out 'panels'"
         )
     return found
 
@@ -427,7 +427,7 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     points.
     """
     if view.by or (view.panels and len(found) > 1):
-        raise DataError("expected a map of one series, without --by, because colours show the values")
+        raise DataError("expected a map of one series, without 'by', because colours show the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
     drawn = []
     for part in parts:
@@ -467,7 +467,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
     """Draw main effects: in each panel, the output against one parameter, averaged over all other parameters."""
     if len(found) > 1 or view.by or view.panels:
         raise DataError(
-            f"expected one series, without --by and --panels, got {', '.join(found)}: main effects need a whole figure"
+            f"expected one series, without 'by' and 'panels', got {', '.join(found)}: main effects need a whole figure"
         )
     ((_, data),) = found.items()
     names = varied(data, output)

@@ -83,6 +83,12 @@ def test_a_title_can_be_set_and_switched_off():
             assert render(draw({"": study(3)}, View("mu", "velocity"))).get_suptitle() == shown
 
 
+def test_a_name_that_all_entries_of_a_legend_share_is_its_title():
+    (legend,) = render(draw({"": study(3, name="hardness")}, View("mu", "velocity"))).legends
+    assert legend.get_title().get_text() == "hardness"
+    assert [text.get_text() for text in legend.get_texts()] == ["1", "1.5", "2"]
+
+
 def test_styles_of_matplotlib_are_used():
     with page.drawing_for(page.requested(style="grayscale")):
         figure = render(draw({"": study(4)}, View("mu", "velocity")))

@@ -205,7 +205,7 @@ def test_words_are_ticks_and_cases_without_value_are_marked(tmp_path, monkeypatc
         (View(MU, "velocty"), "did you mean 'velocity'"),
         (View(MU, "rms_roughness"), "is fixed"),
         (View(MU, "velocity", by="velocity"), "requested twice"),
-        (View(MU, ("velocity", "hurst"), by="normal_force"), "without --by"),
+        (View(MU, ("velocity", "hurst"), by="normal_force"), "without .by."),
         (View(MU, by="hurst"), "main effects need a whole figure"),
     ],
 )
@@ -238,7 +238,7 @@ def test_an_output_with_its_own_dimension_is_drawn_against_it(tmp_path, monkeypa
     figure = described(datasets(url), "trace", "multiple")
     mean = aggregation.mean(datasets(url)[""]["trace"])
     np.testing.assert_allclose(rows(figure).y.to_numpy().reshape(2, 3), mean.transpose("position", "multiple"))
-    with pytest.raises(DataError, match="--over multiple"):
+    with pytest.raises(DataError, match="over multiple"):
         described(datasets(url), "trace", "position")
 
 

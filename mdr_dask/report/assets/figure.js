@@ -131,7 +131,7 @@
   const axis = (how, log, palette) => ({
     title: { text: how.label, standoff: 8 }, type: log ? "log" : "linear", gridcolor: palette.grid, linecolor: palette.line, zerolinecolor: palette.line,
     zeroline: false, ticks: "outside", tickcolor: palette.line, showline: true, mirror: true, automargin: true, exponentformat: "power",
-    ...(log ? { minor: { ticks: "outside", ticklen: 3, tickcolor: palette.line } } : {}),
+    ...(log ? { nticks: 4, minor: { ticks: "outside", ticklen: 3, tickcolor: palette.line } } : {}),
     ...(how.ticks ? { tickvals: how.ticks.map(([place]) => place), ticktext: how.ticks.map(([, text]) => text) } : {}),
     ...(how.reversed ? { autorange: "reversed" } : {}),
   });
