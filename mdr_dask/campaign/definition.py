@@ -113,7 +113,7 @@ class Refinement:
 
     # The interval of the axis. Its scale, linear or logarithmic, is also used to interpolate the outputs.
     spread: Spread
-    # Largest accepted interpolation error of each output, relative to its largest value along the axis.
+    # Largest accepted interpolation error of each output; a relative error refers to the largest value along the axis.
     until: Mapping[str, Tolerance]
     at_most: int
 

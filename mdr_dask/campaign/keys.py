@@ -22,7 +22,7 @@ def of_keys(source: Mapping[str, Any]) -> Campaign:
     """Read a campaign from a dictionary with the keys of a campaign file.
 
     Values may also be paths, Python ranges, pint quantities, and arrays and numbers of numpy, pandas or xarray. Numbers
-    of numpy are rounded to 14 digits: ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
+    of numpy are rounded to 14 digits, so that ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
     """
     keys = {str(key): _written(str(key), value) for key, value in source.items()}
     try:
@@ -52,7 +52,7 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return _quantity(_plain(value.magnitude), f"{value.units:~}")
     if isinstance(value, np.floating):
-        # through the text, a float32 of 0.1 becomes 0.1 and not 0.10000000149
+        # the text of a float32 of 0.1 gives 0.1 and not 0.10000000149
         return tidy(float(str(value)), whole=False)
     if isinstance(value, np.generic):
         return value.item()

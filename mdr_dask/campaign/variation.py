@@ -54,7 +54,7 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    Only an adaptive axis has values, an interval, and its path in the document, `written`.
+    Only an adaptive axis has both values and an interval; `written` is its path in the document.
     """
 
     path: tuple[str, ...]
