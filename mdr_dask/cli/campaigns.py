@@ -72,7 +72,7 @@ def _parameter(row: dict[str, str]) -> str:
 
 
 def _output(row: dict[str, str]) -> str:
-    """Return the meaning, unit and dimensions of an output, and whether it needs a request and has an error."""
+    """Return the meaning, unit and dimensions of an output, whether it needs a request, and whether it has an error."""
     along = row["dimensions"] and f"along {row['dimensions']}"
     missing = "" if row["default"] == "yes" else "only if requested"
     return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))
