@@ -32,8 +32,8 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
 #: Environment variables that limit libraries for linear algebra to one thread if they are set before the import.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: Time in s after the time limit of a case at which its process is killed. A case in plain Python normally raises
-#: TimeoutError at the limit.
+#: A process is killed this time in s after the sum of the time limits of its results. A case in plain Python normally
+#: raises TimeoutError at its limit.
 GRACE = 1.0
 #: After this number of crashes, the other realisations of the case are marked as failed without computing them.
 MOST_CRASHES = 2

@@ -253,7 +253,7 @@ def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Roun
     ]
     if not job.stage.campaign.replication.answers:
         return own
-    from mdr_dask.execute.answers import cases_that_narrow  # imported here, because it imports the fits
+    from mdr_dask.execute.answers import cases_that_narrow
 
     narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
     # least growth, because the number of realisations that a fitted constant needs cannot be estimated
