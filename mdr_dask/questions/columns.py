@@ -119,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for a condition, in which a row has every state of its results, such as ``failed``."""
+        """Return a column for a condition, in which a row is ``failed`` if any of its results failed."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found

@@ -28,7 +28,7 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 }
 #: Relative difference of equal numbers in conditions and selections; users copy numbers from tables with six digits.
 SAME = 1e-5
-#: Dimension of a column with several words in each row; the row equals a word if any of its words does.
+#: Dimension of a column with several words in each row; a row equals a word if the word is among them.
 ALTERNATIVES = "alternatives"
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
