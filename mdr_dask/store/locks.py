@@ -355,7 +355,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Remove the runner files of a lock, each after no task of its run is writing."""
+    """Remove the runner files of a lock, after waiting until no task of their runs is writing."""
     give_up = time.monotonic() + SILENCE
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:

@@ -34,7 +34,7 @@ def verify_packed(path: Path) -> Inspection:
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
             expected = _checksums(path, packed)
-            packed.extractall(folder)  # it never writes outside the folder, even if a file name contains ".."
+            packed.extractall(folder)  # `extractall` never writes outside the folder
             findings = list(_compare(folder, expected))
             try:
                 inspected = verify(folder)

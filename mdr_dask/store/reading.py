@@ -86,7 +86,7 @@ def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # a run may not extend the copy
+        if value is not None and name != "mdr_dask_layout"  # without it, no run extends the copy
     }
     return plain
 
