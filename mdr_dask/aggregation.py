@@ -60,7 +60,7 @@ def grid_error(error: xr.DataArray) -> xr.DataArray:
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the ends of the bootstrap interval of the mean, with the discretisation error, along ``bound``."""
+    """Return the ends of the bootstrap interval of the mean, including the discretisation error, along ``bound``."""
     count = array.sizes["realisation"]
     if error is not None:
         array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
@@ -71,7 +71,7 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return the mean, and both ends of the interval of the mean (see `interval`).
 
-    With one realisation, the interval is the mean plus or minus the discretisation error, or NaN if that is unknown.
+    With one realisation, the interval is the mean plus or minus the discretisation error, or NaN if it is unknown.
     """
     array, error = array.compute(), None if error is None else error.compute()
     middle, ends = mean(array), interval(array, error)

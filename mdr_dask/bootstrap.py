@@ -102,7 +102,7 @@ def _reach(shifts: FloatArray) -> FloatArray:
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack in which the shifted rows shift groups of neighbouring cases instead of single cases."""
+    """Return a stack in which each shifted row shifts a group of neighbouring cases instead of a single case."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)
@@ -131,8 +131,8 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 def widening(count: ArrayLike) -> FloatArray:
     """Return sqrt(n / (n - 1)) t / z for n = `count` realisations.
 
-    Here t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, and z that of the normal
-    distribution.
+    Here t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, and z the same quantile
+    of the normal distribution.
     """
     from scipy.special import ndtri, stdtrit
 
@@ -144,7 +144,7 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    `residuals` is a stack of the differences between data and law. If the law holds, its first row (the data) is about
+    `residuals` is a stack of the differences between data and law. If the law holds, the first row (the data) is about
     as large as the change of the residuals in a resample. The result is NaN for too few resamples.
     """
     caused = _caused(residuals, count)

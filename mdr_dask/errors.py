@@ -1,4 +1,4 @@
-"""The exceptions of mdr_dask, and parts of their messages. Workers pickle them: use positional arguments only."""
+"""The exceptions of mdr_dask, and parts of their messages. Workers pickle exceptions: use positional arguments only."""
 
 from __future__ import annotations
 

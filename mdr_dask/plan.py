@@ -20,8 +20,8 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations of a block of a large study: about a second of computing, for milliseconds of scheduling and
-#: writing.
+#: Number of operations of a block of a large study, which takes about a second to compute, and only milliseconds to
+#: schedule and write.
 OPERATIONS = 1e9
 #: A small study is cut into about `FEW_BLOCKS` blocks for several workers, each with at least `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
@@ -129,7 +129,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the number of operations of a block; if unknown, assume one that gives N results sqrt(N) blocks."""
+        """Return the number of operations of a block. If it is unknown, assume that N results need sqrt(N) blocks."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)
@@ -224,7 +224,7 @@ class Estimate:
 def templates(
     campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
 ) -> tuple[Template, ...]:
-    """Lay out every series of a campaign; raise CampaignError for too many results or a case with too much memory.
+    """Lay out every series of a campaign; raise CampaignError if it has too many results or needs too much memory.
 
     `stored_chunks` contains the chunk lengths of the series that are already in the store.
     """

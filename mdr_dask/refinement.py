@@ -26,7 +26,7 @@ GROUPS = 20
 CHASED = 0.05
 #: Least width of an interval, as a fraction of the axis, which limits the number of values at a discontinuity.
 FINEST = 2.0**-10
-#: Intervals are always halved until one end is a value of this level (3: the eighths of the axis). The outputs at the
+#: Intervals are always halved until one end has at least this level (3: the eighths of the axis). The outputs at the
 #: quarters (level 2) are predicted from only three values, and the prediction may be right by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
@@ -255,10 +255,10 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
     """Return the interpolation error of each interval, shape (lines, values - 1).
 
-    A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
-    output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. The error
-    is the largest difference between these predictions and the monotone cubic through all values, minus an allowance
-    for the scatter of the realisations and the discretisation errors. It may be negative.
+    In the two intervals next to a value of level n, the output is predicted from all values of lower levels, once by a
+    monotone cubic and once by a cubic spline. The error is the largest difference between the predictions and the
+    monotone cubic through all values, minus an allowance for the scatter of the realisations and the discretisation
+    errors. It may be negative.
 
     `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
     middle, 2 at the quarters, ... The shape of the means `groups` is (1 + groups, lines, values), as in `Mean.groups`,

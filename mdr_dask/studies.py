@@ -411,7 +411,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign; a temporary name contains a digest of the campaign and its model."""
+    """Return the path of the store of a campaign; a temporary store is named by a digest of campaign and model."""
     if not is_temporary:
         return found.store
     made_by = f"{models.load(found.model).version} {models.source_digest(found.model)}"

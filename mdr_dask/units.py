@@ -194,7 +194,7 @@ _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
 def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
-    """Return a quantity in the unit `written`, or as ``0.5 mm/s`` for 5e-4 m/s, ``-20 degC`` for 253.15 K."""
+    """Return a quantity as text in the unit `written`, or by default like ``0.5 mm/s`` or ``-20 degC``."""
     if written:
         factor, zero = conversion(written, unit)
         return f"{(value - zero) / factor:.{digits}g} {written}"
