@@ -118,7 +118,7 @@ def _is(column: str, wanted: str) -> bool:
 
 
 def _joined(column: str, wanted: str) -> bool:
-    """Return whether the name of a column is the wanted name followed by a unit, such as ``freq_hz``."""
+    """Return whether a column is called by the wanted name and a unit, such as ``freq_hz``."""
     front, _, behind = column.rpartition("_")
     unit = JOINED.get(behind.casefold(), behind)
     return bool(front) and is_unit(unit) and is_called(front, wanted)

@@ -100,7 +100,6 @@ def _sentence(kind: Vertical, largest: str = "") -> str:
 
 
 def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None:
-    """Raise DataError if the curves of a study differ in a parameter that is not used as a group."""
     for name in values.dims:
         if name not in used and name in values.coords and values.sizes[name] > 1:
             raise DataError(f"the study varies in {str(name)!r} too: keep one of its values, or group by it")
@@ -165,7 +164,6 @@ def _with_laws(
     units: Mapping[str, str],
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return the master curve at the reference `zero`, with the laws of its shift factors and a verdict."""
     unit = units.get(by, "")
     warm = is_temperature(by, unit)
     laws, verdicts = laws_of(found, over, unit, zero, is_temperature=warm)

@@ -129,7 +129,6 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
 
 
 def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
-    """Return the axes of a study that are not columns of the table."""
     free = [str(d) for d in dataset[measured.output].dims if d != "realisation" and d not in measured.conditions]
     for name in free:
         if name not in dataset.coords or dataset[name].dtype.kind not in "fiu":

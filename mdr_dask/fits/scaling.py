@@ -167,8 +167,8 @@ class Collapse(NamedTuple):
     """The shifts of several curves onto a common curve.
 
     `shifts` is a stack, shape (rows, 2, curves), of the shifts along ln(velocity) and ln(friction). `residuals` is the
-    stack of the distances of the points from the common curve. `constants` is the number of fitted constants. `vague`
-    marks the curves whose shift the data do not determine, such as straight curves.
+    stack of the distances of the points from the common curve. `vague` marks the curves whose shift the data do not
+    determine, such as straight curves.
     """
 
     shifts: FloatArray
@@ -183,8 +183,8 @@ def collapse(
     """Shift curves of ln(friction) against ln(velocity) onto a common natural cubic spline by least squares.
 
     The shifts are fitted to the first of the stacked `rows`; the shifts for the other rows follow by linearisation.
-    `curve` contains, for each point, the index of its curve. One search begins with the shifts `start`, another with
-    zero shifts; the better result is used. If `vertical` is false, curves are shifted along ln(velocity) only.
+    `curve` contains, for each point, the index of its curve. If `vertical` is false, curves are shifted along
+    ln(velocity) only.
     """
     from scipy.optimize import OptimizeResult, least_squares
 

@@ -37,10 +37,7 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to a stack of friction against x = ln(velocity), ascending, near the largest friction.
-
-    Points far from the maximum are left out, as given by `TOPS`, until scatter and errors explain the residuals.
-    """
+    """Fit a parabola to a stack of friction against x = ln(velocity), ascending, near the largest friction."""
     for drop in TOPS:
         near = _about_the_top(stack[0], drop)
         top, at, rise, left = _parabola(x[near], stack[:, near])
