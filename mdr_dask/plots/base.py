@@ -61,7 +61,6 @@ class Plot:
 
 
 def _squeezed(data: xr.Dataset) -> xr.Dataset:
-    """Turn axes with one value into scalar coordinates."""
     if "status" not in data:
         return data
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])

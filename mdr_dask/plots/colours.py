@@ -29,7 +29,7 @@ def most() -> int:
 
 
 def colour(number: int) -> str:
-    """Return the colour of a curve. The requested style takes precedence over `COLOURS`."""
+    """Return the colour of a curve."""
     from matplotlib.colors import to_hex
 
     colours = _cycle("color") or COLOURS
@@ -37,10 +37,7 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return the line style and the marker of a curve.
-
-    All curves have the same line style and marker, unless all colours are grey or the requested style defines them.
-    """
+    """Return the line style and the marker of a curve."""
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)

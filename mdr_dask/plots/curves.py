@@ -65,7 +65,7 @@ def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
 
 
 def axes_of(data: xr.Dataset, output: str) -> list[str]:
-    """Return the dimensions of an output that are axes of the study. The dimension ``realisation`` is not an axis."""
+    """Return the dimensions of an output that are axes of the study."""
     if "status" in data:
         cases = {str(dim) for dim in data["status"].dims}
     else:

@@ -148,11 +148,11 @@ class Figure:
     states: Sequence[xr.DataArray] | None = None
 
     def leave_out(self, sentences: Iterable[str]) -> None:
-        """Add texts about results that are not drawn. Empty texts and texts that are already present are ignored."""
+        """Add texts about results that are not drawn."""
         self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
 
     def judge(self, law_holds: str) -> None:
-        """Write on the figure whether a fitted law holds. Every answer except yes is a warning."""
+        """Write on the figure whether a fitted law holds."""
         if law_holds.startswith("yes"):
             self.bars = f"{self.bars}; {law_holds}"
         else:

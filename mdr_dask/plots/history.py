@@ -57,7 +57,6 @@ def _changes(panel: Panel) -> bool:
 
 
 def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
-    """Return the panels of a series: friction, velocity and normal force."""
     last = float(data[TIME].values[-1])
     time = Axis(r"$(t - t_0)/\tau$", low=-LEAD * last, high=last)
     panels = [Panel(time, Axis("coefficient of friction", quantity=FRICTION), bar=one.bar)]

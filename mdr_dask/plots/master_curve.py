@@ -73,7 +73,6 @@ def _text(value: float, values: xr.DataArray) -> str:
 
 
 def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
-    """Return two panels: one with the curves as measured, one with the merged curve."""
     by, across = str(curve.attrs["group"]), _label(curve.attrs["abscissa"], curve["curve_abscissa"])
     channels = _channels(curve)
     names = [_words(curve.attrs[channel]) for channel in channels]
