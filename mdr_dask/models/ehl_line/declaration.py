@@ -114,7 +114,6 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Raise ValueError unless one parameter of each pair is given, with the parameters that it requires."""
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:

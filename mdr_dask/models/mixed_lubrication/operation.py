@@ -106,7 +106,6 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
 
 
 def _mean_pressure(case: MixedLubrication) -> float:
-    """Return the mean pressure in Pa: the normal force divided by the area of the Hertzian contact."""
     return case.normal_force / (2 * float(case.dry_contact(case.normal_force).half_width) * case.roller_width)
 
 
@@ -138,10 +137,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function that computes the film from the load share of the film, and a warning.
-
-    The warning is empty unless the case is outside the range of the film formula.
-    """
+    """Return a function that computes the film from the load share of the film, and a warning."""
     E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width

@@ -102,10 +102,7 @@ def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> 
 def drawn(
     operation: Operation, revolution: Revolution, lines: FloatArray, wanted: Collection[str]
 ) -> dict[str, FloatArray]:
-    """Return the requested outputs that are arrays: the trace of the contact length, and the profiles.
-
-    The profiles show both surfaces around the contact at the time when the length in intimate contact is largest.
-    """
+    """Return the requested outputs that are arrays: the trace of the contact length, and the profiles."""
     case, points, found = operation.case, lines.shape[1], {}
     if "contact_length_trace" in wanted:
         travels = np.arange(case.trace_points) * points // case.trace_points

@@ -89,7 +89,6 @@ def _add_missed(
     floors: Mapping[str, float],
     advice: str = "",
 ) -> None:
-    """Add a message if requested outputs miss the accuracy of the campaign."""
     if block.accuracy is None:
         return
     known = [name for name in block.outputs if np.isfinite(found.get(name, np.nan))]

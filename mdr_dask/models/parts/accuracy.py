@@ -22,8 +22,7 @@ def missed_accuracy(
 
     The relative error is the largest absolute error of the output, divided by its largest absolute value or by its
     floor, whichever is larger. `values` and `errors` have the shape (cases, ...); elements that are NaN in `values` or
-    in `errors` are ignored. A floor has the unit of its output. `where` is added to the messages, such as ``" on the
-    finest grid"``.
+    in `errors` are ignored. `where` is added to the messages, such as ``" on the finest grid"``.
     """
     shares = {
         name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()

@@ -64,7 +64,7 @@ def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]
 
     The file is a text, an npy file, or a file that SurfaceTopography can read. Each row of a text or npy file contains
     the heights along x at one y. In the map, missing points are NaN. `units` are the units and spacings that the user
-    states. Raise DataError if a unit or spacing is missing, or if the user and the file contradict each other.
+    states.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -84,7 +84,7 @@ def read_scan(file: DataFile, units: Units) -> Scan:
     """Return the line scan in a file. Missing heights are interpolated.
 
     The file is a table, or a file that SurfaceTopography can read. `units` are the units and the spacing that the user
-    states. Raise DataError if a unit is missing, or if the user and the file contradict each other.
+    states.
     """
     from mdr_dask.physics.surfaces.maps import require_few_missing
 
@@ -174,7 +174,6 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
 
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
-    """Return the unit stated by the file or by the user; raise DataError if their units differ."""
     if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
         raise DataError(
             f"{file.name}: the file states {stated}, got {given!r}: leave out `{option}` or correct the file"

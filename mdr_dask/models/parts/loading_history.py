@@ -119,7 +119,7 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
     `velocity` and `force` are the parameters of the sliding body, and `change` is the relative change of the velocity
-    at a jump. The last piece ends at t = infinity. Raise DataError if a table contradicts the state before t = 0.
+    at a jump. The last piece ends at t = infinity.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

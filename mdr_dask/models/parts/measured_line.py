@@ -51,7 +51,6 @@ class ProfileFile(NamedByFile):
 
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:
-        """Raise an error for an invalid file when the campaign is read, before any case is computed."""
         check_in_campaign(info, lambda: line_of(self))
         return self
 

@@ -75,7 +75,6 @@ class ModulusTable(NamedByFile):
 
     @model_validator(mode="after")
     def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
-        """Raise an error for an invalid table when the campaign is read, before any case is computed."""
         check_in_campaign(info, lambda: _measured(self))
         return self
 

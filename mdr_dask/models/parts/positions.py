@@ -33,8 +33,7 @@ def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None,
     """Remove positions and row numbers from the outermost rows and columns of a table of heights.
 
     Return the heights, the steps of the positions along x and y, and remarks that name the removed rows and columns. A
-    step is None if the table has no positions along this axis. Raise DataError if positions are not equidistant, or if
-    two rows (or two columns) of positions have different steps.
+    step is None if the table has no positions along this axis.
     """
     if min(rows.shape) < 4 * OUTER:
         return rows, (None, None), ()
@@ -112,8 +111,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
     """Arrange points, which are given in any order, in rows of heights; return the rows and the steps along x and y.
 
-    Grid points without a height become NaN. Raise DataError if two points have the same position or if the grid is not
-    regular.
+    Grid points without a height become NaN.
     """
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1

@@ -71,7 +71,7 @@ class SlidingProblems:
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
         """Yield the setting and the case indices of each group of solvable cases.
 
-        The cases of a group have the same setting and the same value in each of the columns.
+        All cases of a group have the same value in each of the `columns`.
         """
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
@@ -82,10 +82,7 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Find the different pairs of Deborah number and load among the cases `members`.
-
-        Return the Deborah numbers and the loads of the different pairs, and for every case the index of its pair.
-        """
+        """Return the different pairs of Deborah number and load of some cases, and the index of every case's pair."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
@@ -146,7 +143,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
 def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
     """Return the profile of an indenter with positions divided by `length` and heights divided by `height`.
 
-    The resulting numbers are rounded, so that cases that differ only by rounding errors have equal profiles.
+    The numbers are rounded, so that cases that differ only by rounding errors have equal profiles.
     """
     if body is None:
         return None

@@ -120,10 +120,7 @@ def without_exponent(value: Any, surface: str) -> Any:
 
 @lru_cache(maxsize=64)
 def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
-    """Return the spectra C2D of a surface between its cut-offs, one for each file.
-
-    Raise DataError if a file has no spectrum, or if a cut-off is outside the range of the spectrum.
-    """
+    """Return the spectra C2D of a surface between its cut-offs, one for each file."""
     return tuple(
         _within(surface, found, file)
         for file, found in zip(surface.measured.files, surface.measured.found(), strict=False)
@@ -154,8 +151,7 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
     """Return the amplitudes, in m, of the lines that replace a surface in the method of dimensionality reduction (MDR).
 
-    There is one line for each file of the surface. Raise DataError if a line has no wave within the range of its
-    spectrum.
+    There is one line for each file of the surface.
     """
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):

@@ -208,7 +208,6 @@ def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
 
 
 def _steepness(slope: float) -> tuple[str, ...]:
-    """Return a warning about units if the surface is steeper than 45 degrees."""
     if not slope > 1:
         return ()
     return (f"rms slope {slope:.3g}, steeper than 45 degrees (are the units of heights and positions right?)",)
@@ -275,10 +274,7 @@ class LevelledMap(NamedTuple):
 
 @lru_cache(maxsize=16)
 def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
-    """Return height parameters and spectrum of one map.
-
-    Raise DataError if the file holds no map, or if too many points are missing.
-    """
+    """Return height parameters and spectrum of one map."""
     from mdr_dask.physics.surfaces.maps import filled, outliers, require_points, spectrum_of_map, without_trend
 
     surface, remarks = read_map(file, Units(maps.unit, maps.x_unit, maps.spacing, maps.spacing_y))

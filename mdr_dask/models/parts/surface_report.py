@@ -114,11 +114,9 @@ def _of_scan(scans: ScanFiles, file: DataFile, row: dict[str, float | str]) -> d
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the mean of several spectra at the wave numbers of the first one, and the relative standard error of the
-    mean.
+    """Return the wave numbers of the first spectrum, the mean of the spectra, and its relative standard error.
 
-    At each wave number, the mean includes only the spectra whose range contains this wave number. If the mean includes
-    only one spectrum, the standard error is NaN.
+    At each wave number, the mean includes only the spectra whose range contains this wave number.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

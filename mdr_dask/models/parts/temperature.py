@@ -62,7 +62,6 @@ class ShiftFactors(NamedByFile):
 
     @model_validator(mode="after")
     def _holds_factors(self, info: ValidationInfo) -> ShiftFactors:
-        """Raise an error for an invalid table when the campaign is read, before any case is computed."""
         check_in_campaign(info, lambda: self.reference)
         return self
 
