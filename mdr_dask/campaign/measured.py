@@ -15,7 +15,7 @@ from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.models.numbers import numbers_of
+from mdr_dask.models.numbers import least_of, numbers_of
 from mdr_dask.tables import AGREE, Line, Read, Sheet, listed, matched, read_sheet, read_table
 from mdr_dask.units import shown
 
@@ -60,18 +60,21 @@ def read_measured(
     outputs: Mapping[str, str],
     axes: Mapping[str, ArrayLike] | None = None,
     wanted: Collection[str] = (),
+    least: Mapping[str, float] | None = None,
 ) -> Measured:
     """Read a table of measured points. `conditions` and `outputs` map names of possible columns to their SI units.
 
     If the table contains several outputs, the one among `wanted` is read. A heading may be short for a name:
     ``temperature`` means ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An
     axis without a column is an unknown parameter. DataError is raised if the numbers of an unused column lie within the
-    range of such an axis, because the column may be meant for this axis.
+    range of such an axis, because the column may be meant for this axis. `least` contains lower bounds of conditions.
     """
     sheet = read_sheet(text, source)
     units = {**outputs, **conditions}
     short = _short_names(units)
-    columns = [Column(name, unit, short[name], needed=False) for name, unit in units.items()]
+    columns = [
+        Column(name, unit, short[name], needed=False, least=(least or {}).get(name)) for name, unit in units.items()
+    ]
     present = {column.name for column, _, _ in matched(sheet, columns) if column} if sheet.names else set()
     found = [name for name in outputs if name in present]
     found = [name for name in found if name in wanted] or found
@@ -206,7 +209,8 @@ def _readings(
     for one in series if table else ():
         assert table is not None
         try:
-            yield one, read_measured(table.read_text(), table.name, *_of_series(model, outputs, one))
+            columns = _of_series(model, outputs, one)
+            yield one, read_measured(table.read_text(), table.name, *columns, least=least_of(model))
         except DataError as error:
             yield one, error
 

@@ -25,6 +25,7 @@ from mdr_dask.fits.interpolation import FEWEST
 from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, likelihood, posterior
 from mdr_dask.fits.prediction import Prediction, prediction
+from mdr_dask.models.numbers import least_of
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
@@ -216,7 +217,8 @@ def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
     axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim}
-    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted)
+    least = least_of(str(dataset.attrs.get("model")))
+    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted, least=least)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:

@@ -324,6 +324,7 @@ class Model(Generic[P]):
     * `whole`: parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
     becomes too large, the axis of the last of these parameters is divided first.
     * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
+    * `least`: smallest possible value of coordinates, such as 0 for a radius.
     * `distinct`: number of different solutions among the cases of a block, for ``check``; by default the number of
     cases.
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
@@ -342,6 +343,7 @@ class Model(Generic[P]):
     operations: Callable[[Block[P]], float] | None = None
     whole: tuple[str, ...] = ()
     coordinates: Callable[[P], dict[str, Coordinate]] = lambda _: {}
+    least: Mapping[str, float] = field(default_factory=dict)
     distinct: Callable[[Block[P]], int] | None = None
     memory: Callable[[Block[P]], float] = lambda _: 0.0
     units: Callable[[P], dict[str, str]] = lambda _: {}

@@ -165,6 +165,15 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
     assert len(error.splitlines()) == 1
 
 
+@pytest.mark.parametrize(("name", "unit"), [("radius", "mm"), ("cycles", "10^3"), ("normal_force", "N")])
+def test_impossible_conditions_of_measured_points_are_refused(write, capsys, name, unit):
+    rest = "outputs: [worn_profile]\nmeasured: {table: scar.csv}\n"
+    path = write(STEEL + "  last_radius: 0.2 mm\n  cycles: [1e3, 1e4]\n", rest)
+    Path("scar.csv").write_text(f"{name} [{unit}];worn_profile [um]\n-0.1;3\n0;1\n0.1;3\n")
+    assert main(["check", str(path)]) == 2
+    assert f"scar.csv:2:1: column {name}: expected at least 0" in capsys.readouterr().err
+
+
 def test_rows_of_a_profile_without_a_number_are_left_out_and_counted(write, capsys):
     rows = ["0,0", "1e-4,1e-6", "2e-4,4e-6", "3e-4,9e-6", "4e-4,16e-6"]
     path, heading = write(TABLE), "radius [m],height [m]"

@@ -64,7 +64,7 @@ def test_measured_conditions_scatter_around_the_values_of_the_curves(groups, tmp
     assert any("2 of 3 points differ in normal_force by up to 0.3 %" in text for text in figure.notes)
 
 
-@pytest.mark.parametrize(("row", "is_drawn"), [("1e9,4e-3", 1), ("0.01,4e6", 1), ("0,4e-3", 0), ("-0.01,4e-3", 0)])
+@pytest.mark.parametrize(("row", "is_drawn"), [("1e9,4e-3", 1), ("0.01,4e6", 1), ("0,4e-3", 0)])
 def test_points_are_drawn_wherever_the_axes_can_show_them(groups, tmp_path, row, is_drawn):
     figure = drawn(groups, tmp_path, f"velocity [m/s],friction_coefficient\n0.01,2e-3\n{row}\n")
     (points,) = (trace for trace in figure.panels[0].traces if trace.what == "measured")
