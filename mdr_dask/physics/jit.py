@@ -1,8 +1,7 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
 Numba compiles a kernel again only if the file that contains the kernel has changed. If you change a function that is
-called by kernels in other files, empty numba's cache or set NUMBA_CACHE_DIR to a new folder. The tests set
-NUMBA_CACHE_DIR automatically.
+called by kernels in other files, empty numba's cache or set NUMBA_CACHE_DIR to a new folder.
 """
 
 from __future__ import annotations
@@ -26,10 +25,7 @@ def jit(function: Kernel) -> Kernel:
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that creates no arrays, without reference counting for arrays.
-
-    With reference counting, functions that read arrays from named tuples inside loops are several times slower.
-    """
+    """Compile a function that must not create arrays; reading arrays from named tuples is then several times faster."""
     return _cached(function, UNCOUNTED)
 
 
@@ -39,12 +35,12 @@ def jit_inline(function: Kernel) -> Kernel:
 
 
 def jit_inline_fused(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls it; a product and the sum with it are rounded only once."""
+    """Compile a function into each kernel that calls it; ``a * b + c`` is rounded only once."""
     return cast(Kernel, numba.njit(forceinline=True, fastmath={"contract"}, **OPTIONS)(function))
 
 
 def jit_inline_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that creates no arrays into each kernel that calls it, without reference counting."""
+    """Compile a function into each kernel that calls it; as for `jit_uncounted`, it must not create arrays."""
     return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))
 
 
@@ -61,11 +57,7 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Turn errors of the cache into warnings.
-
-    A kernel that cannot be read from the cache is compiled again. A kernel that cannot be written is used without being
-    stored.
-    """
+    """Turn errors of numba's cache into warnings; kernels that cannot be read are compiled again."""
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:
@@ -92,7 +84,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the last index in [low, high) with values[index] <= x, or `low` if none; `values` must be ascending."""
+    """Return the last index in [low, high) with values[index] <= x, by default `low`; `values` must be ascending."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

@@ -43,9 +43,8 @@ class Solution(NamedTuple):
     """Results of some cases on one grid.
 
     `values` contains one array per output, with one number or one profile per case. NaN in a profile marks positions
-    where the output does not exist. `outcome` contains values of `Outcome`. `unseen` is a relative error that the
-    difference between two grids may not show. It is added to the error estimate. It is a number or an array of shape
-    (outputs, cases).
+    where the output does not exist. `outcome` contains values of `Outcome`. `unseen`, a number or an array of shape
+    (outputs, cases), is a relative error that the difference between two grids may not show.
     """
 
     values: Sequence[FloatArray] | FloatArray
@@ -84,16 +83,16 @@ def refine(
 
     The function `solve(level, cases)` solves the cases with the given indices on the grid of a level. It must not raise
     an exception for a case that fails. Every case is solved on at least two levels, unless it fails because of its
-    parameters. If a case fails on fine grids only, the solution on the finest of the coarser grids is returned.
+    parameters. If a case fails on fine grids only, its last solution is returned.
 
     The accuracy of an output is relative to the largest absolute value of the output, or to its entry in `floors` if
     that is larger. If `accuracy` is infinite, the second level is accepted. `order` is the order of convergence of the
-    dominant part of the error. `requested` is the number of outputs that must meet the accuracy, or None for all
-    outputs. These outputs come first. The errors of the other outputs are infinite.
+    dominant part of the error. Only the first `requested` outputs must meet the accuracy, or all outputs if `requested`
+    is None. Outputs that are not requested have infinite errors.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all outputs of
-    this case, because one output alone may be the same on two grids by chance. Choose False for outputs that converge
-    at different rates.
+    this case, because one output alone may be the same on two grids by chance. Choose `shared` = False for outputs
+    that converge at different rates.
     """
     reduction = 2.0**order
     left = np.arange(cases)
@@ -112,8 +111,7 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change[:requested].max(axis=0, initial=0.0), change.shape)
-        # if a case had no solution on an earlier grid, `before` is infinite, and the second term of the maximum is left
-        # out
+        # `before` is infinite if a case had no solution on an earlier grid; the second term of the maximum is then 0
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
         solved = fine.outcome == Outcome.CONVERGED
@@ -136,8 +134,8 @@ def refine(
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
-    The largest change of a profile is divided by its largest absolute value. The change is infinite if a case has no
-    solution on one of the grids.
+    The largest change of a profile is divided by the largest absolute value of the profile. The change is infinite if a
+    case has no solution on one of the grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))

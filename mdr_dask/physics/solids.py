@@ -182,7 +182,7 @@ def fit_series(
         G' and G'', Pa, positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
     terms_per_decade : float
         Number of relaxation times per decade. The relaxation times extend from half a decade below the smallest 1 /
-        omega to half a decade above the largest.
+        omega to half a decade above the largest 1 / omega.
     dashpot : bool
         Whether a parallel dashpot is fitted as well.
 
@@ -298,9 +298,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
     The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. The times
     tau_m must be ascending and distinct. Then lambda_k lies between tau_k and tau_(k+1), and the largest lambda_k lies
-    above the largest tau_m. The second result contains tau_m - lambda_k in row m and column k. These differences are
-    precise even if the times cover many decades, because each lambda_k is computed as a distance from the nearest
-    tau_m.
+    above the largest tau_m. The second result contains tau_m - lambda_k in row m and column k.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -312,6 +310,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
         offset = sign * _distance_to_zero(pole, sign, gap, weight, times)
         zeros[k] = times[pole] + offset
         for m in range(terms):
+            # the difference is precise even if the times cover many decades
             distance[m, k] = (times[m] - times[pole]) - offset
     return zeros, distance
 

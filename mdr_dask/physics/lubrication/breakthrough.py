@@ -2,8 +2,8 @@
 
 A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``; D is the length of
 the interval. The cluster breaks the layer if ``int (z - h0) dx > s D^3`` with the layer strength
-``s = pi tau0/(12 E* h_c)`` (eqs. 5.5, 5.6). The contact zone is a window of given width, which is placed at every node.
-The lines are closed: the first node follows the last. They are cubic splines, so the integrals are exact.
+``s = pi tau0/(12 E* h_c)`` (eqs. 5.5, 5.6). The contact zone is a window that begins at each node in turn.
+The lines are closed cubic splines: the first node follows the last, and all integrals are exact.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
-#: Treatment of a cluster that continues beyond an edge of the window. ``part``: the part inside the window is tested
-#: and counted, as if the cluster ended at the edge. ``clip``: the whole cluster is tested, but only the part inside the
-#: window is counted. ``whole``: the whole cluster is tested and counted. ``inside``: such a cluster is ignored.
+#: Treatment of a cluster that continues beyond an edge of the window; ``inside``: such a cluster is ignored.
+#: ``part``: the part inside the window is tested and counted, as if the cluster ended at the edge.
+#: ``clip``: the whole cluster is tested, and the part inside is counted. ``whole``: all of it is tested and counted.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-PARTS = 64  # of a spacing: lengths in contact are counted in whole parts
+PARTS = 64  # number of parts of a spacing; lengths in contact are whole numbers of parts
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
@@ -42,10 +42,9 @@ def _counted(length: float) -> int:
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add `number` to `count` successive entries of the trace, beginning with the entry `begin`.
+    """Add `number` to the lengths in contact of `count` successive windows; the first begins at node `begin`.
 
-    Entry k of the trace is the length in contact in the window that begins at node k. The array `jumps` holds the
-    differences between neighbouring entries of the trace.
+    `jumps` holds the differences between the lengths in contact of neighbouring windows.
     """
     points = jumps.size - 1
     while begin < 0:
@@ -64,8 +63,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to the windows that contain only its beginning or only its end.
 
-    If `judged` is True, the part inside the window has to break the layer by itself; otherwise, the whole cluster has
-    to break it. A part longer than `reach` cannot break the layer, whatever its shape.
+    If `judged` is True, the part of the cluster inside the window is tested, otherwise the whole cluster.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
@@ -112,8 +110,9 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
 
 @jit
 def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
-    """Add the contributions of all clusters to `jumps`, then replace `jumps` by its cumulative sum: the trace."""
+    """Write the lengths in contact of all windows to `jumps`, which must contain zeros."""
     points = jumps.size - 1
+    # a part of a cluster that is longer than `reach` cannot break the layer
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
     for c in range(clusters.start.size):
         start, end = clusters.start[c], clusters.end[c]
@@ -140,8 +139,8 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
 def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
     """Return the length in intimate contact, in parts (see `PARTS`), of the window that begins at each node.
 
-    `window` is the length of the window in spacings; the window must not be longer than the line. `rule` is one of
-    `EDGE_RULES`. The fraction of windows with a length above zero is the breakthrough probability.
+    `window` is the length of a window in spacings, and must not exceed the length of the line. `rule` is one of
+    `EDGE_RULES`. The breakthrough probability is the fraction of windows whose length in contact is not zero.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -175,8 +174,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
     """Return the length of a cluster beyond an edge of the window, and the integral of ``z - h0`` over this length.
 
-    The cluster is followed to the right of the edge if `most` is positive, and to the left if it is negative, up to the
-    distance ``|most|``.
+    The search covers the distance ``|most|``, to the right of the edge if `most` is positive, else to the left.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1

@@ -22,10 +22,9 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Turn `row` from second integrals of ``ln|x|`` into integrals of ``ln|x|`` times the hat function of each node.
+    """Replace second integrals of ``ln|x|`` in `row` by integrals of ``ln|x|`` times the hat function of each node.
 
-    The hat function of a node is 1 at this node, 0 at all other nodes, and linear in between. The entries of the first
-    and the last node become zero.
+    The hat function of a node is 1 at this node, 0 at all other nodes, and linear between nodes.
     """
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
@@ -39,10 +38,7 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``.
-
-    The first and the last entry are 0.
-    """
+    """Write the integral of ``ln|point - X|`` times the hat function of each inner node j to ``row[j]``."""
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)
@@ -52,7 +48,7 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 def influence_matrix(nodes: FloatArray) -> FloatArray:
     """Return the matrix D, shape (n, n), with ``delta_i - delta(0) = sum_j D_ij P_j``.
 
-    The first and the last pressure must be zero. The deformation relative to that at ``X = 0`` is
+    The first and the last pressure must be zero. The deformation relative to its value at ``X = 0`` is
     ``-(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
     """
     n = nodes.size
@@ -80,7 +76,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     result = np.empty(points.size)
     for i in range(points.size):
         _influence_row(points[i], nodes, row)
-        total = 0.0  # BLAS is not used, because its last bits depend on the number of threads
+        total = 0.0  # no BLAS, because the last bits of its results depend on the number of threads
         for j in range(nodes.size):
             total += (origin[j] - row[j]) * pressure[j]
         result[i] = central_film + 0.5 * points[i] ** 2 + total / pi

@@ -82,7 +82,7 @@ def fluid_friction(
 
 def thick_film(film: float) -> str:
     """Return a message if a film h/R is too thick for lubrication theory, otherwise an empty string."""
-    if not film > 0.1:  # a roller then differs from a parabola by more than a few per cent
+    if not film > 0.1:  # up to this height, a roller differs from a parabola by a few per cent at most
         return ""
     return (
         "the film is thicker than 0.1 of the radius: the rollers cannot be approximated by parabolas, and "
@@ -130,10 +130,7 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material``.
-
-    The fitted data lie in the `ranges` of W, U and G.
-    """
+    """A regression ``h/R = factor W^load U^speed G^material``, fitted to data in the `ranges` of W, U and G."""
 
     name: str
     factor: float
@@ -152,7 +149,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Return a message about those of W, U and G that lie outside the fitted ranges; empty if all lie inside."""
+        """Return a message that names the numbers outside their fitted ranges, or an empty string."""
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
             for symbol, value, (low, high) in zip("WUG", (W, U, G), self.ranges, strict=True)
@@ -161,13 +158,11 @@ class FilmFormula:
         return f"film formula {self.name} is extrapolated: {', '.join(outside)}" if outside else ""
 
 
-# The ranges are quoted from memory, because no open copy of the papers was available
-# (docs/evidence/mixed-lubrication.md).
+# ranges quoted from memory, because no open copy of the papers was available (docs/evidence/mixed-lubrication.md)
 _PAN_HAMROCK_RANGES = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
 _DOWSON_HIGGINSON_RANGES = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
 
-#: Pan and Hamrock (1989). The factor of the central film is 2.922; the thesis prints 2.992 in eq. 5.3 and 2.929 in
-#: appendix B.
+#: Pan and Hamrock (1989) state the factor 2.922; the thesis prints 2.992 in eq. 5.3 and 2.929 in appendix B.
 PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, _PAN_HAMROCK_RANGES)
 PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, _PAN_HAMROCK_RANGES)
 DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, _DOWSON_HIGGINSON_RANGES)
@@ -182,7 +177,7 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. A film in units of ``a^2/R``, times this factor, is ``h/R``."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, the factor from films in units of ``a^2/R`` to ``h/R``."""
     return 8 * W / np.pi
 
 
@@ -203,14 +198,14 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
 REGIMES = ("rigid isoviscous", "rigid piezoviscous", "elastic isoviscous", "elastic piezoviscous")
 
 RIGID_ISOVISCOUS = 4.894968  # (h_min/R) W/U of a rigid parabola with the Reynolds exit condition (Kapitza)
-RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) if the isoviscous pressure reaches 1/alpha (Blok)
+RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) if the largest isoviscous pressure is 1/alpha (Blok)
 ELASTIC_ISOVISCOUS = 2.05  # (h_min/R) M^(1/5) (2 U)^(-1/2) of soft bodies (Moes)
 
 
 def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
     """Return the minimum film ``h/R`` in each of the four limiting regimes, shape (4, ...), in the order of `REGIMES`.
 
-    The elastic piezoviscous film is that of Dowson and Higginson, as in Johnson's map of the regimes.
+    As in Johnson's map of the regimes, the formula of Dowson and Higginson gives the elastic piezoviscous film.
     """
     W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
     M = moes_parameters(W, U, G).M
@@ -233,9 +228,9 @@ def expected_film(M: float, L: float) -> float:
 def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the regime of each case as an index of `REGIMES`.
 
-    Elastic flattening makes an isoviscous film thicker, so the isoviscous film is the larger of the rigid and the
-    elastic limit. It makes a piezoviscous film thinner, so the piezoviscous film is the smaller of its two limits. The
-    regime is that of the thicker of these two films.
+    Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. The isoviscous film is
+    therefore the larger of its rigid and elastic limits, and the piezoviscous film the smaller of its two limits. The
+    regime is isoviscous if the isoviscous film is at least as thick as the piezoviscous film.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

@@ -14,7 +14,7 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.deformation import film as film_at
 from mdr_dask.physics.lubrication.grids import adapted_density
 
-_SPIKE = 0.01  # least height of a pressure spike above the minimum before it, divided by the maximum pressure
+_SPIKE = 0.01  # least height of a spike above the pressure minimum upstream, divided by the maximum pressure
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class GridSolution:
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
         """Return the pressure at other nodes, shifted so that its steep front moves from `self.front` to `front`.
 
-        The last node upstream of the new front gets the pressure half a cell upstream of the old front, and the next
-        node the pressure half a cell downstream of it. These two pressures are nearly the same on a finer grid.
+        The two nodes around the new front get the pressures half a cell upstream and half a cell downstream of the old
+        front, which are nearly the same on a finer grid.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -60,7 +60,7 @@ class GridSolution:
 
     @cached_property
     def density(self) -> FloatArray:
-        """The density that the nodes should have for this solution, evaluated at the nodes."""
+        """Density of nodes that suits this solution, evaluated at the nodes."""
         return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property
@@ -70,12 +70,10 @@ class GridSolution:
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and value of the minimum film, interpolated around the node with the thinnest film.
-
-        The polynomial is of fifth order, because the interpolation error of a cubic would exceed the other errors.
-        """
+        """Position and value of the minimum film, interpolated around the node with the thinnest film."""
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         low, high = float(self.nodes[i - 1]), float(self.nodes[i + 1])
+        # fifth order, because the interpolation error of a cubic would exceed the discretisation error
         found = minimize_scalar(
             lambda x: _between(self.nodes, self.film, np.array([x]), 3)[0],
             bounds=(low, high),
@@ -85,26 +83,20 @@ class GridSolution:
 
     @cached_property
     def spike(self) -> tuple[float, float]:
-        """Position and pressure of a second pressure maximum, downstream of the first; both NaN if there is none."""
+        """Position and pressure of the spike, a second pressure maximum near the outlet; NaN if there is no spike."""
         peak, _ = self._spike
         return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
 
     @property
     def resolves_spike(self) -> bool:
-        """Whether the pressure needs at least two cells downstream of the spike to fall by half of the spike's height.
-
-        The height of the spike is counted from the pressure minimum upstream of the spike.
-        """
+        """Whether the pressure behind the spike needs at least two cells to fall by half of the spike's height."""
         peak, lowest = self._spike
         behind = self.pressure[peak:]
         return peak > 0 and int(np.argmax(behind <= 0.5 * (lowest + behind[0]))) > 1
 
     @cached_property
     def front(self) -> float:
-        """Position downstream of the spike at which the pressure equals the minimum before it; NaN without a spike.
-
-        Unlike the pressure of the spike, this position hardly depends on where the nodes lie.
-        """
+        """Position downstream of the spike at which the pressure equals the minimum upstream; NaN without a spike."""
         peak, lowest = self._spike
         if not peak:
             return float("nan")
@@ -113,10 +105,7 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """The index of the node of the spike, and the lowest pressure between the last two pressure maxima.
-
-        Both are 0 if there is no spike.
-        """
+        """Index of the node of the spike, and the lowest pressure between the last two maxima; 0 without a spike."""
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
@@ -126,12 +115,10 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Position where the film ends, extrapolated from the last four positive pressures.
-
-        The pressure tends to zero quadratically there.
-        """
+        """Position where the film ends, extrapolated from the last four positive pressures."""
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
+        # the square root of the pressure falls to zero almost linearly
         x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
         if not (root.size == 4 and np.all(np.diff(root) < 0)):
             return float(behind)
@@ -149,10 +136,9 @@ def cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Predict a quantity on a grid with another spacing from the solutions on earlier grids.
+    """Predict a quantity on another grid from one or two earlier solutions; `reading` evaluates it on one grid.
 
-    `reading` evaluates the quantity on one grid. If there are at least two solutions, the quantity is extrapolated from
-    the last two, on the assumption that its error is proportional to the square of the spacing.
+    With two solutions, the error of the quantity is taken as proportional to the square of the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:

@@ -10,11 +10,11 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-FLOODED = 300.0  # distance of a flooded inlet from X = -1 over sqrt(2 Hc), Hc central film: 2e-5 of the film is lost
+FLOODED = 300.0  # flooded inlet: distance from X = -1 in units of sqrt(2 H(0)); relative error of the film: 2e-5
 
 
 def inlet_position(central_film: float) -> float:
-    """Return where a fully flooded film begins, in half widths."""
+    """Return the position where a fully flooded film begins, in half widths."""
     return -1.0 - FLOODED * float(np.sqrt(2 * central_film))
 
 
@@ -53,9 +53,8 @@ def aligned(
 ) -> tuple[FloatArray, float]:
     """Return about `count` nodes with a given density, and the product of node spacing and density.
 
-    The film ends at a node on every grid, so that errors on different grids can be compared. `front` is the position
-    downstream of a spike at which the pressure falls within one or two cells; without a spike, it is NaN. The cells are
-    made slightly wider or narrower until the front lies near the middle of a cell.
+    A node lies at `rupture`, where the film ends, so that errors on different grids can be compared. The position
+    `front` (see `GridSolution.front`) lies near the middle of a cell, unless it is NaN.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -78,10 +77,7 @@ def _halved_by(share: float, cells: int) -> int:
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
-    """Return the number of cells before a position.
-
-    `number` contains the number of cells before each of the `positions`.
-    """
+    """Return the number of cells before `position`, from the `number` of cells before each of the `positions`."""
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]
     slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
@@ -91,8 +87,7 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
     """Return a grid of `count` nodes for an expected central film.
 
-    For a thin film, the grid is fine at both ends of the dry contact. For a thick film, it is fine around the minimum
-    of the parabolic gap.
+    The nodes are densest at both ends of the dry contact if the film is thin, and around ``X = 0`` if it is thick.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     finest = min(0.7 * central_film ** (2 / 3), length)
@@ -110,17 +105,14 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 
 
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return a first guess of the pressure: Hertz' ellipse, or, for a thick film, a wider ellipse further upstream."""
+    """Return a first guess of the pressure: Hertz' ellipse, or, for a thick film, a wider ellipse centred upstream."""
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second derivative at the nodes from divided differences.
-
-    The first and the last node get the result of the neighbouring node.
-    """
+    """Return the second derivative at the nodes; both end nodes get the result of the neighbouring node."""
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])
@@ -129,10 +121,9 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
     """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    The density is a sum of three terms. The flow, whose discretisation error is of second order, needs a density of
-    ``sqrt(|H''|/H)``. The deformation, whose error is of third order, needs a density proportional to the cube root of
-    ``|P''|``. A minimum density provides nodes in the contact and in the inlet. Finally, the sum is smoothed, so that
-    neighbouring cells have similar widths.
+    The flow, with errors of second order, needs a density proportional to ``sqrt(|H''|/H)``. The deformation, with
+    errors of third order, needs a density proportional to the cube root of ``|P''|``. A third term provides nodes in
+    the contact and in the inlet. The sum is smoothed, so that neighbouring cells have similar widths.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

@@ -1,9 +1,8 @@
 """The elastohydrodynamic film of a line contact, in all regimes from rigid isoviscous to elastic piezoviscous.
 
 Hertz units are ``X = x/a``, ``P = p/p0`` and ``H = h R/a^2`` (thesis eq. B.13). With ``E' = 2 E*``, they follow from
-``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. The first solutions of a case determine the density of nodes for
-all following grids of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third order in the
-spacing.
+``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. Preliminary solutions of a case determine the density of nodes on
+all grids of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third order in the spacing.
 """
 
 from __future__ import annotations
@@ -24,19 +23,17 @@ from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, R
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
 
-NODES = (40, 80, 160, 320, 640, 1280)  # of the grids; on the finest, a Newton step takes about 0.1 s
+NODES = (40, 80, 160, 320, 640, 1280)  # numbers of nodes of the grids; a Newton step with 1280 nodes takes about 0.1 s
 ORDER = 3.0  # order of convergence of the values extrapolated from two grids
 ACCURACY = 1e-3  # default relative error of the films
-PRELIMINARY = 2  # index in `NODES` of the grid whose solution determines the density of nodes of all grids
-#: Settings of the attempts at the first solution: the factor by which the expected film is multiplied; the largest
-#: guess of the film, divided by the square of the inlet position; the number of nodes; and the limits of Newton's
-#: method. The second attempt is slow but hardly ever fails.
+PRELIMINARY = 2  # the preliminary grids, which determine the density of nodes, have NODES[PRELIMINARY] nodes
+#: Attempts at the first solution of a case; the second attempt is slow but hardly ever fails.
+#: Entries: factor of the expected film; limit of guess / (inlet position)^2; number of nodes; limits of the iteration.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Limits of Newton's method on all further grids. The first pair of limits is for a guess extrapolated from earlier
-#: grids. If this attempt fails, the second pair is for a guess that equals the solution on the previous grid.
+#: Limits of Newton's method on all further grids; the second limits are for another guess, if the first attempt fails.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-PLACED = 0.1  # least stated error of a position, in cells
-REACH = 2.0  # the error of a profile is the largest within this distance, in cells of the second finest grid
+PLACED = 0.1  # smallest stated error of a position, in cells
+REACH = 2.0  # in cells of the second finest grid: `profile` states the largest error within this distance
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
@@ -86,7 +83,7 @@ def line_contact(
     Parameters
     ----------
     groups : tuple of float
-        Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
+        Load, speed and material parameters W, U and G, defined with ``E' = 2 E*`` and the mean velocity.
     E_star : float
         Contact modulus in Pa. The maximum pressure p0, which follows from `E_star` and W, makes the density law and
         Roelands' law dimensionless.
@@ -181,8 +178,8 @@ class LineSolution:
     def spike(self) -> tuple[Estimate, Estimate]:
         """Return position (in half widths) and pressure (in p0) of the spike; NaN if there is no spike.
 
-        The values are those on the finest grid. If the pressure downstream of the spike falls within one cell, the
-        pressure of the spike depends on where the nodes lie, so its stated error is infinite.
+        Position and pressure are those on the finest grid. The stated error of the pressure is infinite if the finest
+        grid does not resolve the spike (see `GridSolution.resolves_spike`).
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
@@ -199,7 +196,7 @@ class LineSolution:
 
 
 def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
-    """Return pairs of a grid and the next finer grid: the last three pairs, or all if there are fewer."""
+    """Return the last three pairs of a grid and the next finer grid, or all pairs if there are fewer."""
     return list(itertools.pairwise(solved))[-3:]
 
 
@@ -281,8 +278,7 @@ def solve_film(
     readings : sequence of callable, GridSolution -> float or array
         Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-        One magnitude for each reading, 0 by default. The error of a reading is divided by the reading, or by the
-        magnitude if the reading is smaller than the magnitude.
+        One floor for each reading, 0 by default. The error of a reading below its floor is relative to the floor.
 
     Returns
     -------
@@ -336,10 +332,8 @@ def solve_film(
 
 
 def operations(accuracy: float) -> float:
-    """Return the approximate number of operations of a solution: ten Newton steps on each grid, each with 30 n^2.
-
-    The error is of third order, so each factor of 8 in the accuracy needs another grid.
-    """
+    """Return the approximate number of operations of `solve_film`: 30 n^2 in each of ten Newton steps on each grid."""
+    # the error is of third order: each finer grid divides it by 8
     grids_needed = 1.0 if accuracy == 0 else min(np.log(1 / accuracy) / np.log(8) / len(NODES), 1.0)
     nodes = np.array([NODES[PRELIMINARY]] * 2 + [*NODES[: round(grids_needed * len(NODES))]])
     return 300.0 * float(np.sum(nodes**2))

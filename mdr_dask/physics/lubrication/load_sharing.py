@@ -1,9 +1,9 @@
 """Load of a rough contact, shared between film and asperities (Johnson, Greenwood and Poon, Wear 19, 91, 1972).
 
 The film carries the fraction gamma of the load. The rollers are deformed by the whole load, not only by the pressure of
-the film. The film is therefore that of a smooth contact in which load and modulus are both multiplied by gamma: W stays
-the same, U becomes ``U/gamma`` and G becomes ``gamma G``. The asperities of a line are springs of the MDR with the
-stiffness ``E* dx``. A line as long as its longest wavelength represents a square area with edges of this length.
+the film. The film is therefore as thick as in a smooth contact with gamma times the load and gamma times the modulus: W
+stays the same, U becomes ``U/gamma`` and G becomes ``gamma G``. The asperities of a line are springs of the MDR with
+the stiffness ``E* dx``. A line as long as its longest wavelength represents a square area with edges of this length.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-_CLOSED = -37.0  # distance between mean heights, in rms heights, at which the mean gap is about 1e-301
+_CLOSED = -37.0  # in rms heights: the distance between the mean heights at which the mean gap is about 1e-301
 
 
 def mean_overlap(distance: float) -> float:
@@ -26,10 +26,10 @@ def mean_overlap(distance: float) -> float:
 
 
 def distance_of_means(gap: float) -> float:
-    """Return the distance d (see `mean_overlap`) at which the mean gap ``<(d - z)+>`` is `gap`; unit: rms height."""
+    """Return the distance d (see `mean_overlap`) for a mean gap ``<(d - z)+>``, in units of the rms height."""
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
-    # the mean gap at d is the mean overlap at -d, is not less than d, and its logarithm varies slowly with d
+    # the mean gap at d is `mean_overlap(-d)`; it is at least d, and its logarithm varies slowly with d
     return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, gap + 1, xtol=1e-13))
 
 
@@ -65,10 +65,10 @@ def share_load(
 ) -> SharedLoad:
     """Return the film for which the load shares of film and asperities add up to one.
 
-    `film_at` returns the film that carries a given load share. This film becomes thinner as the share rises; it may be
-    0 if it is too thin to be computed. `asperity_share` returns the load share of the asperities, which falls as the
-    film becomes thicker. `tolerance` is the allowed relative error of the load share of the film; the relative error of
-    the film is about a quarter of `tolerance`. If there is no such film, the asperities carry the whole load, and film
+    `film_at` returns the film that carries a given load share, or 0 if the film is too thin to be computed.
+    `asperity_share` returns the load share of the asperities at a given film. `film_at` and `asperity_share` are
+    decreasing functions. `tolerance` is the allowed relative error of the film's load share; the relative error of the
+    film is about a quarter of `tolerance`. If no film balances the load, the asperities carry the whole load, and film
     and film share are 0.
     """
 

@@ -2,8 +2,8 @@
 
 The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), in finite
 volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0`` for the pressure P and the flow
-balance R of each volume. The unknowns are the pressures at the nodes and the film at ``X = 0``. The additional equation
-for this film is that of the load, ``int P dX = pi/2``.
+balance R of each volume. The unknowns are the pressures at the nodes and the film at ``X = 0``. The load gives one more
+equation, ``int P dX = pi/2``.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from mdr_dask.physics.outcome import Outcome
 _QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; the rest is linear upwind
 _FILM_SHARE = 0.8  # one step may reduce the film at a node by at most this fraction
 _LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
-_SHRINKS = 0.1  # a factorised Jacobian is reused while steps shrink at least by this factor
-#: Relative size of the last step; the remaining error is about its square. After a step with a reused Jacobian, the
-#: remaining error is larger, so the size must be a hundred times smaller.
+_SHRINKS = 0.1  # a factorised Jacobian is reused while each step is smaller than this fraction of the previous step
+#: Largest relative size of the last step; the remaining error is about the square of this size.
+#: After a step with a reused Jacobian, the remaining error is larger, so this step must be a hundred times smaller.
 _TOLERANCE = 1e-4
 
 
@@ -46,11 +46,7 @@ class Grid(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Limits of an iteration.
-
-    `clip` is the largest allowed change of any pressure in one step, divided by the largest pressure. `most` is the
-    largest allowed number of steps.
-    """
+    """Largest change of a pressure in one step, divided by the largest pressure, and largest number of steps."""
 
     clip: float
     most: int
@@ -121,8 +117,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     """Return the weights of the nodes f-1, f and f+1 in an interpolated value halfway between f and f+1.
 
-    The liquid flows from node f to node f+1. The value is a weighted mean of a quadratic interpolation and of a
-    linear extrapolation from upstream (see `_QUADRATIC`).
+    The liquid flows from node f to node f+1.
     """
     if f == 0:
         return 0.0, 0.5, 0.5
@@ -196,10 +191,7 @@ def balance(
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
-    """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`.
-
-    They include the effect of the pressures on the film.
-    """
+    """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`."""
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
@@ -233,7 +225,7 @@ def _fill_equations(
 ) -> None:
     """Write the matrix `A` and right side `b` of the Newton equations for the active pressures and the central film.
 
-    The step sets all other pressures to zero.
+    The step sets all inactive pressures to zero.
     """
     R, by_pressure, by_film = found
     count = active.size
@@ -272,7 +264,7 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 @jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
-    """Add the deformation under the pressures P to the film H; four films are computed at the same time."""
+    """Add the deformation under the pressures P to the film H."""
     n = P.size
     for i in range(0, n - 3, 4):
         h0, h1, h2, h3 = H[i], H[i + 1], H[i + 2], H[i + 3]
@@ -318,7 +310,7 @@ def _take_step(
 ) -> tuple[float, float]:
     """Change P, H and the film at ``X = 0`` by the allowed fraction of a Newton step.
 
-    Return the film at ``X = 0`` and the relative size of the step: infinite if it was shortened, NaN if the film
+    Return the film at ``X = 0`` and the relative size of the step: infinite for a shortened step, NaN if the film
     closes.
     """
     share = _step_length(grid, P, H, step, change, clip)

@@ -15,8 +15,8 @@ from mdr_dask.errors import distinguishable
 
 _LUBRICANT_EXPANSION = 0.6278  # expansion in 1/K times density in kg/m^3, both at 60 F (ASTM D1250, table 54D)
 
-#: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: the pair (s, t) for each kind of oil, quoted from
-#: memory from Gold et al. 2001 (see docs/evidence/mixed-lubrication.md).
+#: Pairs (s, t) of Gold's correlation ``alpha = s nu^t 1e-9``, with nu in mm^2/s, for each kind of oil.
+#: The numbers are quoted from memory from Gold et al. 2001 (see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
     "gold_polyalphaolefin": (7.382, 0.1335),
@@ -75,8 +75,8 @@ def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArra
 def density_at(temperature: ArrayLike, density: float, reference_temperature: float) -> FloatArray:
     """Return the density at a temperature in K: ``rho_ref exp(-b dT (1 + 0.8 b dT))`` with ``b = 0.6278/rho_ref``.
 
-    `density` is rho_ref, the density in kg/m^3 at the reference temperature; dT is the difference from this
-    temperature. The formula is that of ASTM D1250, table 54D, in which the reference temperature is 60 F.
+    `density` is rho_ref, the density in kg/m^3 at the reference temperature; dT is the difference from that
+    temperature. The formula is from ASTM D1250, table 54D, in which the reference temperature is 60 F.
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))
@@ -179,8 +179,8 @@ OILS: dict[str, Oil] = {
 }
 
 
-ROELANDS_PRESSURE = 1.9609e8  # p_r in Pa
-ROELANDS_LOGARITHM = 9.67  # of ln eta0 + 9.67, with eta0 in Pa s
+ROELANDS_PRESSURE = 1.9609e8  # p_r of Roelands' law in Pa
+ROELANDS_LOGARITHM = 9.67  # the constant in ln eta0 + 9.67, with eta0 in Pa s
 
 
 def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
@@ -215,5 +215,5 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
     )
 
 
-DENSITY_RISE = 0.6e-9  # in 1/Pa (thesis eq. B.6)
-DENSITY_SATURATION = 1.7e-9  # in 1/Pa (thesis eq. B.6)
+DENSITY_RISE = 0.6e-9  # constant of the density law in 1/Pa (thesis eq. B.6)
+DENSITY_SATURATION = 1.7e-9  # constant of the density law in 1/Pa (thesis eq. B.6)

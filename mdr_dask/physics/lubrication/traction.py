@@ -1,7 +1,7 @@
 """Friction of a lubricated line contact from the shear of its film.
 
-The film is that of pure rolling of an isothermal Newtonian liquid, so slide-roll ratios have to be small. Heating and
-shear thinning would make film and traction smaller.
+The film is computed for pure rolling and an isothermal Newtonian liquid, so slide-roll ratios have to be small. Heating
+and shear thinning would make film and traction smaller.
 """
 
 from __future__ import annotations
@@ -32,10 +32,7 @@ def shear_stress(
 def sliding_coefficient(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> float:
-    """Return the integral of the shear stress in the middle of the film, divided by the load.
-
-    The arguments are those of `shear_stress`.
-    """
+    """Return the integral of the shear stress in the middle of the film (see `shear_stress`), divided by the load."""
     stress = shear_stress(case, grid, W, slide_roll_ratio, eyring_stress)
     return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
 

@@ -1,7 +1,7 @@
 """Matrices of the MDR transforms on graded panels, for functions that are a polynomial inside each panel.
 
-As functions of z = r^2, both transforms are Abel's half-integrals. Substitutions remove the square roots, and Gauss's
-rule then integrates the remaining smooth functions with no more than the rounding error.
+As functions of z = r^2, both transforms are Abel's half-integrals. Substitutions remove the square roots, so that
+Gauss's rule is exact to rounding.
 """
 
 from __future__ import annotations
@@ -84,10 +84,7 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
-    """Return the nodes through which the polynomial of a panel passes.
-
-    They are the nodes of this panel and the last node of the previous panel.
-    """
+    """Return the nodes on the polynomial of a panel: the nodes of the panel and the last node of the previous panel."""
     return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
 
 

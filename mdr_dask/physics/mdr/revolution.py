@@ -158,7 +158,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
             return gap
         if gap <= -start:
             return -level
-        if gap > 0.25 * start:  # here the difference does not suffer from cancellation
+        if gap > 0.25 * start:  # for so large a gap, the difference does not suffer from cancellation
             return math.pow(start + gap, n) - level
         return level * math.expm1(n * math.log1p(gap / start))
     if abs(gap) >= 0.02:
@@ -180,7 +180,7 @@ def _piece(image: Image, place: float, derivative: int) -> float:
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
-    """Return the profile of a table of radii and heights, pressed to a depth; all are in the same unit of length.
+    """Return the profile of a table of radii and heights, pressed to a depth; all lengths have the same unit.
 
     The radii begin at 0, and heights are measured from the first height.
     """
@@ -207,10 +207,7 @@ FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: Any, depth: float) -> TableProfile:
-    """Return the profile of a `surfaces.shapes.Shape`, pressed to a depth in the unit of length of the body.
-
-    The cubic pieces become shorter towards the axis, the contact edge and the `breaks` of the body.
-    """
+    """Return the profile of a `surfaces.shapes.Shape`, pressed to a depth in the unit of length of the body."""
 
     def sunk(x: float) -> float:
         return -float(body.at(np.array([x]))[0][0])
@@ -220,6 +217,7 @@ def from_body(body: Any, depth: float) -> TableProfile:
         high *= 2.0
     a0 = bisect(lambda x: sunk(x) - depth, 0.0, high)
     ends = sorted({0.0, a0, FARTHEST * a0, *(r for r in body.breaks if 0.0 < r < FARTHEST * a0)})
+    # the cubic pieces become shorter towards all `ends`
     steps = np.sin(0.5 * np.pi * np.arange(2 * KNOTS) / (2 * KNOTS)) ** 2
     parts = [low + (high - low) * steps**2 for low, high in pairwise(ends)]
     knots = np.append(np.concatenate(parts), ends[-1])

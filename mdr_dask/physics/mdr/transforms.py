@@ -143,8 +143,7 @@ def pressure(
     contact_radius : float
         Half-width a of the one-dimensional contact.
     edge_gap : float
-        Jump of the line load at the edge, which is the value of d - g just inside the edge. Under a flat punch this
-        jump is not zero.
+        Line load d - g just inside the contact edge; under a flat punch it is not zero.
     jumps : sequence of (position, height)
         Positions inside the contact where g itself jumps, and the heights of the jumps.
 

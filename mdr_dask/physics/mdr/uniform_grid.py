@@ -106,9 +106,8 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`.
 
-    The integral is needed for the first cell as well, where it diverges for r = low = 0. There, the slope of the line
-    load is taken as proportional to x instead of constant, with the same mean. The integral of slope / x over the cell
-    is then twice the mean slope, so the function returns 2.
+    For r = low = 0, where the integral diverges, the result is 2: the slope of the line load is taken as proportional
+    to x in the first cell, and the integral of slope / x is then twice the mean slope.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -7,7 +7,7 @@ As u is periodic, the forces are sums over the nodes:
     F_N / (4 G dx) = sum of u_i
     F_x / (4 G) = sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1))
 
-Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks, one vector
+Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In all other blocks, one vector
 instruction treats several cases.
 """
 
@@ -26,9 +26,7 @@ from mdr_dask.physics.sliding.cases import Cases, first_depths
 ITERATIONS = 200
 COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
 COARSEST = 64  # the search for the depth starts on a grid with at most this number of nodes
-# The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is an
-# estimate of the relative error of the drag, which is extrapolated over the last step of the depth.
-CONVERGED = 1e-9
+CONVERGED = 1e-9  # allowed product of the last two relative steps of the depth, which estimates the error of the drag
 COARSE = 1e-3  # used instead of CONVERGED on all grids except the finest
 
 BLOCK = 256  # number of nodes in a block
@@ -37,12 +35,12 @@ LANES = 8  # number of cases in one vector instruction
 # Indices of the results of a sweep for every case
 CARRIED, STIFFNESS, DRAG = range(3)
 SUMS = 3
-# Indices of the properties of a block of nodes: largest and smallest height, smallest rise, height of the node before
-# the block, and the sums of height, rise, height times rise, and rise squared
+# Columns of `Nodal.blocks`. STEEPEST is the smallest rise, and BEFORE the height of the node before the block.
+# HEIGHTS, RISES, WORK and SQUARES are the sums of height, rise, height times rise, and rise squared over the block.
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
-# Indices of the state of a case in a sweep: displacement u (U), the derivative of u with respect to the depth (FADE),
-# the factor by which u decays over a block out of contact (THROUGH), the sum of the decay factors at the nodes of a
-# block (MEMORY), and three sums over the nodes of a block: of u (LOAD), of FADE (RATE) and of the drag (LOSS)
+# Rows of `Lanes.state`: displacement u (U), and the derivative of u with respect to the depth (FADE).
+# THROUGH is the decay factor of u over a free block, and MEMORY the sum of the decay factors at the nodes of the block.
+# LOAD, RATE and LOSS are sums over the nodes of a block: of u, of FADE and of the drag.
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
@@ -87,7 +85,7 @@ class Lanes(NamedTuple):
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
     """Return u and du/d(depth) at a node of height h, and the contribution of this node to (1 - lambda) F_x / (4 G).
 
-    The rise from the previous node is t. At the previous node the displacement is `u`, and du/d(depth) is `fade`.
+    At the previous node, the height is h - t, the displacement is `u`, and du/d(depth) is `fade`.
     """
     free = decay * u
     w = h + depth
@@ -109,9 +107,9 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 @jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
-    """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
+    """Add the sums of a block in all cases in which the block is entirely in contact or entirely free.
 
-    Write the indices of the other cases to the queue, and return their number.
+    Write the indices of all remaining cases to the queue, and return the number of remaining cases.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -189,8 +187,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Move one element of every case along the line, and write the sums.
 
-    On a periodic line the element starts and ends at the highest node. On any other line it starts undeformed at the
-    first node.
+    Elements start in contact at the highest node of a periodic line, or undeformed at the first node of any other line.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -269,7 +266,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """For every case, write the number of nodes in contact to `touched`, and the rms of their rises to `slope`."""
+    """For every case, write the number of nodes in contact to `touched`, and the rms rise to these nodes to `slope`."""
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -291,8 +288,8 @@ def steady_by_steps(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return three arrays: depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
 
-    A periodic line starts at the node after the highest node and ends at the highest node. On any other line, elements
-    enter undeformed at the first node. Deborah numbers are v tau / dx, loads are F_N / (4 G dx) in the unit of height.
+    A periodic line must end at its highest node. Deborah numbers are v tau / dx, loads are F_N / (4 G dx) in the unit
+    of height.
     """
     strides = [1]
     while height.size > COARSEST * strides[-1]:

@@ -36,12 +36,10 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     if terms:
         relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
         pressure = pressure + series(waves * relaxing, nodes)
-    # the drag is the mean of pressure times slope over the nodes; the static pressure adds no drag, because the
-    # mean of height times slope is 0
+    # drag: mean of pressure times slope; the static pressure adds no drag, as the mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    # first check the nodes of the extreme pressures without the dashpot, and of the extreme slopes: they exclude full
-    # contact in most cases
+    # the nodes of extreme slope, or of extreme pressure without the dashpot, exclude full contact in most cases
     worst = [pressure.argmin(), pressure.argmax(), slope.argmin(), slope.argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch

@@ -3,8 +3,8 @@
 The unit of length is the cell width, a slope is the rise over one cell, and ``deborah`` is the distance v tau in cells.
 Heights are measured from the highest point of the line, so that the penetration is w = depth + height with depth > 0.
 The displacement of an element is u = w in contact; at the distance s after contact ends, u and du/d(depth) have decayed
-by the factor exp(-s / deborah). A change of the depth also shifts the places where contact begins and ends, but this
-changes the load only to second order.
+by the factor exp(-s / deborah). If the depth changes, the shift of the places where contact begins and ends changes the
+load only to second order.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is passed in one step
 TINY = 1e-290  # smaller displacements are set to 0
-CLOSE = 1e-8  # in cells; Newton's method ends after a step shorter than this; the next step would be a rounding error
+CLOSE = 1e-8  # Newton's method ends after a step shorter than this (in cells); the next step would be a rounding error
 ITERATIONS = 80
 
 # Indices of the results of a sweep
@@ -63,9 +63,9 @@ def blocks_of(cells: Cells) -> Blocks:
 class Barriers(NamedTuple):
     """Limits of the depth for each cell and each block, at one Deborah number.
 
-    If the depth is above the limit `cell`, the force on elements in contact is positive everywhere in the cell; the
-    limit `block` has the same meaning for a block. If the depth is at most `idle`, this force is positive nowhere in
-    the cell. The limit of a block is NaN until the limits of its cells are computed.
+    At depths above the limit `cell` or `block`, the force on elements in contact is positive everywhere in the cell or
+    block. At depths up to `idle`, the force on elements in contact is positive nowhere in the cell. The limit of a
+    block is NaN until the limits of its cells are computed.
     """
 
     cell: FloatArray
@@ -83,10 +83,7 @@ def barriers_for(cells: int) -> Barriers:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the barriers of a block and of its cells, computed from the force w + deborah w'.
-
-    The limits `idle` follow from the largest Bernstein coefficient, which is an upper bound of the force.
-    """
+    """Write the barriers of a block and of its cells, computed from the force w + deborah w'."""
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
         h0, a, b, c = cubic(height, enter, leave, i)
@@ -101,6 +98,7 @@ def write_barriers(
             inside = first - x * (q + x * (r + x * c))
             highest = inside if inside > highest else highest
         written[i] = highest
+        # the largest Bernstein coefficient is an upper bound of the force
         idle[i] = min(min(first, last), min(near, far))
         every = highest if highest > every else every
     barriers.block[block] = every
@@ -108,7 +106,7 @@ def write_barriers(
 
 @jit
 def _decayed(x: float) -> float:
-    """Return 1 - exp(-x) for x >= 0. A series is used for small x: it is faster and exact to rounding."""
+    """Return 1 - exp(-x) for x >= 0. For small x, a series is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
     # multiply by 1 / 5 instead of dividing by 5, because divisions would make a sweep 10 % slower
@@ -202,8 +200,8 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
     """Return the first place between `low` and `stop` where contact with a free element begins, or `NONE`.
 
-    Let u_free be the displacement of the element. Where the force w + deborah w' is positive, the product (w - u_free)
-    exp(x / deborah) increases. Contact therefore begins at most once in each interval of positive force.
+    Contact begins at most once in each interval of positive force w + deborah w', because there (w - u) exp(x /
+    deborah) increases, with the displacement u of the free element.
     """
     w0, a, b, c, u, start = element
     for _ in range(3):
@@ -222,7 +220,7 @@ def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float
 
 @jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
-    """Return two integrals from `start` to `end`: of w and of w'^2. Gauss's rule is exact for these polynomials."""
+    """Return the integrals of w and of w'^2 from `start` to `end`; Gauss's rule with three nodes is exact."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
     x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
     before, centre, after = (
@@ -237,11 +235,10 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return four contributions of a free recovery: load, derivative of the load, drag, and derivative of the drag.
+    """Return the load and the drag of a free recovery, each followed by its derivative with respect to the depth.
 
-    Derivatives are with respect to the depth. The contribution to the load is the integral of u, which is deborah times
-    the decrease of u; the contribution to the drag is half the decrease of u^2. The derivative of the drag includes the
-    shift of the place where contact begins again; the line has the slope `slope` there.
+    The derivative of the drag includes the shift of the place where contact begins again, at which the line has the
+    slope `slope`.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -252,7 +249,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells in which a free element stays free; return the next cell, and u at the start of this cell."""
+    """Skip cells in which a free element stays free; return the next cell, and u at the start of the next cell."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -272,11 +269,11 @@ def sweep_cells(
 ) -> int:
     """Move one element once along the line; return the number of contact patches.
 
-    The limits of a block that are still NaN are written to `barriers` when they are needed. The entries of `sums` are:
-    the integral of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its
-    derivative; the length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not
-    periodic is in contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the first
-    `capacity` patches begin and end; further patches are only counted.
+    Limits in `barriers` that are still NaN are computed when they are needed. The entries of `sums` are: the integral
+    of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its derivative; the
+    length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not periodic is in
+    contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the first `capacity` patches begin
+    and end; further patches are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -296,8 +293,7 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # `left` is the place where the last contact ended, `u` the displacement of the element at this place, and `free`
-    # its displacement at the start of the current cell
+    # `left`: place where the last contact ended; `u` and `free`: displacement at this place, at the start of the cell
     u = free = left = 0.0
     # a period ends at the highest point, inside the last cell, which is a copy of the first cell
     last = n if cells.periodic and start > 0 else n - 1
@@ -382,7 +378,7 @@ def sweep_cells(
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays: where each patch begins, and where each patch ends; arguments as in `sweep_cells`."""
+    """Return the positions where the contact patches begin, and the positions where they end; see `sweep_cells`."""
     n = cells.mean.size - 1
     places = np.empty((2, n // 8 + 2))
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)

@@ -7,7 +7,8 @@ integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of
 cancels in slow sliding. In full contact the results are exact on any grid.
 
 If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms.
-Otherwise the solver follows one element from cell to cell. The results of a case do not depend on the other cases.
+In all other blocks, the solver follows one element from cell to cell. The results of a case are the same if further
+cases are solved in the same call.
 """
 
 from __future__ import annotations
@@ -30,14 +31,15 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import series
 
 BLOCK = 32  # number of cells in a block
-WING = 4  # a node of a finer grid is interpolated from this number of nodes on each side of the cell around it
+WING = 4  # number of nodes on each side of a cell from which the finer nodes in the cell are interpolated
 BEFORE, AFTER = WING + 1, WING + 2  # `refine` needs these numbers of nodes before and after the period
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
-# Indices of the bounds and sums of a block of cells
+# Columns of `Nodes.blocks`. PEAK bounds the height; LOWEST and STEEPEST are the smallest nodal height and slope.
+# HEIGHTS and SQUARES are the integrals of the height and of the squared slope over a block.
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
-# Rows of a tile (a part of a line on a finer grid): height and slope at each node, beginning with the node before the
-# tile; then for each cell the integrals of the height and of the squared slope, and the largest height
+# Rows of a tile (a part of a line on a finer grid). HEIGHT and SLOPE begin at the node before the tile.
+# MEAN, SQUARE and TOP are, in each cell, the integrals of the height and of the squared slope, and the largest height.
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
@@ -45,12 +47,10 @@ IN_A_TILE = 5
 class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
-    `height` is relative to the first node, `slope` is the rise per cell, and `ends` contains the results of `_ends_of`
-    or is empty. These arrays begin with the last `BEFORE` nodes of the previous period, and end with the first `AFTER`
-    nodes of the next period. A row of `blocks` contains, for one block: upper bound of the height, height of the lowest
-    node, smallest slope at a node, integral of the height, and integral of the squared slope. `top` is the height from
-    which `height` is measured. The highest point of the line is in the cell before the first node; `rise` is its height
-    above the first node. On coarse grids the first node is the highest node, and `rise` is 0.
+    `height` is measured from the first node, at the height `top`; `slope` is the rise per cell, and `ends` contains the
+    results of `_ends_of` or is empty. The arrays `height`, `slope` and `ends` begin with the last `BEFORE` nodes of the
+    previous period, and end with the first `AFTER` nodes of the next period. `rise` is the height of the highest point
+    above the first node. The highest point is in the cell before the first node; on coarse grids, `rise` is 0.
     """
 
     height: FloatArray
@@ -65,8 +65,8 @@ def _ends_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
     """Return corrections of the trapezium rule for the integrals of the height and of the squared slope.
 
     The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
-    at node j. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which are
-    important for the integrals over small contacts.
+    at node j. Corrections from local derivatives would miss the shortest waves, which are important for the integrals
+    over small contacts.
     """
     waves, slope = line.roughness.coefficients, line.nodes[1]
     n = slope.size
@@ -77,10 +77,9 @@ def _ends_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
 
 
 def nodes(line: RoughLine, first: int, stride: int) -> Nodes:
-    """Return the line that consists of every stride-th node of a line with two nodes per Nyquist point.
+    """Return every `stride`-th node of a line with two nodes per Nyquist point, beginning at node `first`.
 
-    The line begins at node `first`. If `stride` > 2 (less than one node per Nyquist point), the slopes are differences
-    of the heights.
+    If `stride` > 2 (less than one node per Nyquist point), the slopes are computed from differences of the heights.
     """
     height, slope = line.nodes
     n = height.size // stride
@@ -101,7 +100,7 @@ def _write_nodes(
     stride: int,
     line: Nodes,
 ) -> None:
-    """Write the arrays of `line`; the arguments are those of `nodes` and the results of `_ends_of`."""
+    """Write the arrays of `line`; `corrections` contains the results of `_ends_of`."""
     h, s, ends, blocks = line.height, line.slope, line.ends, line.blocks
     n = h.size - BEFORE - AFTER
     _write_periodic(height, first, stride, h)
@@ -133,7 +132,7 @@ def _write_nodes(
 
 @jit
 def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatArray) -> None:
-    """Write every stride-th value of a period from `first` on, and those at `BEFORE` and `AFTER` nodes around it."""
+    """Write every `stride`-th value from `first` on for one period, and for `BEFORE` and `AFTER` nodes around it."""
     n, place = written.size - BEFORE - AFTER, first
     for i in range(BEFORE, BEFORE + n):
         written[i] = values[place]
@@ -157,9 +156,8 @@ def _integrals(
     """Write the integrals over each cell: of the height to `mean`, and of the squared slope to `square`.
 
     The input arrays begin one node before the first cell; `square` needs one entry more than there are cells. The
-    trapezium rule is corrected with `of_height` and `of_square`, the results of `_ends_of`. If these arrays are empty,
-    the rule is corrected by the Euler-Maclaurin formula, with derivatives from heights and slopes at neighbouring
-    nodes.
+    trapezium rule is corrected with `of_height` and `of_square`, the results of `_ends_of`. If `of_height` is empty,
+    the Euler-Maclaurin formula gives the corrections, with derivatives from heights and slopes at neighbouring nodes.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -196,8 +194,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
     """Write the tile for `cells` cells of the line, beginning at node `first`; return the number of cells of the tile.
 
-    Each cell of the line is divided into ``weights.shape[1]`` cells of the tile. The nodes of a tile include one node
-    before and one node after these cells.
+    Each cell of the line is divided into ``weights.shape[1]`` cells of the tile.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
     # the exact corrections in `ends` are known only at the nodes of the line, not at the nodes of a finer tile
@@ -267,17 +264,17 @@ RESOLVED = 10  # a grid is fine enough only if at least this number of cells is 
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # the search ends after a step of at most this fraction of the depth; results are extrapolated
+LAST_STEP = 0.03  # the search ends after a step of at most this fraction of the depth
 SECANT_ERROR = 0.1  # assumed error of the extrapolation over the last step, divided by the extrapolated change
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
 ROWS = 15
-# Offset of each quantity in the workspace of a sweep. State of a case: displacement (U), derivative of the displacement
-# with respect to the depth (FADE), and contact (CONTACT: 1 in contact, 0 if free). Sums of a case: load, stiffness
-# (RATE), drag (LOSS), length in contact, and integral of the squared slope over this length (STRETCH). Constants of a
-# case: depth, De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and displacement at the start of the period
-# (BEGAN). CALM is 1 if the last block is entirely in contact or entirely free in this case.
+# Offset of each quantity of a case in the workspace of a sweep.
+# State: displacement (U), derivative of U with respect to the depth (FADE), and CONTACT (1 in contact, 0 if free).
+# Sums: load, stiffness (RATE), drag (LOSS), length in contact, and integral of the squared slope in contact (STRETCH).
+# Constants: depth, De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and U at the start of the period (BEGAN).
+# CALM is 1 if the last block is entirely in contact or entirely free.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 # Indices of the results of a case that are extrapolated over the last step of the depth
@@ -333,9 +330,8 @@ def _contact_end(
 ) -> tuple[float, float, float]:
     """Return the place in a cell where contact ends, w at this place, and the fraction of w left at the cell's end.
 
-    Contact ends where the force falls to 0; from there on, the element recovers freely. The Deborah number is `r`, and
-    `inverse` is 1 / r. The force falls from `force` at `begins` to `force_end` at the end of the cell. Linear
-    interpolation gives a first estimate of the place, which one Newton step improves.
+    The Deborah number is `r`, and `inverse` is 1 / r. The force falls from `force` at the place `begins` to `force_end`
+    at the end of the cell. One Newton step improves the place that is found by linear interpolation of the force.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -355,8 +351,8 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
     """Return the place where a free element meets the line, and the fraction of its displacement u that remains there.
 
     The displacement of the element is u at the start of the cell; `inverse` is 1 / De. At the place `last` the gap
-    between element and line is `gap_last` < 0. A parabola through the gaps at the start of the cell and at `last` gives
-    a first estimate of the place, which one Newton step improves.
+    between element and line is `gap_last` < 0. One Newton step improves the place at which a parabola through the gaps
+    at the start of the cell and at `last` crosses 0.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -466,9 +462,9 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
-    """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
+    """Add the sums of a block in all cases in which the block is entirely in contact or entirely free.
 
-    Write the indices of the other cases to the queue, and return their number.
+    Write the indices of all remaining cases to the queue, and return the number of remaining cases.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -565,11 +561,11 @@ def _search(
 ) -> None:
     """Find the depths of cases on a grid by Newton's method; extrapolate the results over the last step of the depth.
 
-    The search ends after a step of at most `LAST_STEP` times the depth, if the extrapolation changes the drag so little
-    that the estimated relative error of the drag is at most `error`. `depths` contains the penetrations of the summit;
-    the first guesses are replaced by the solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms
-    of the results with respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS),
-    receives drag, contact fraction and contact slope, and is not changed if no depth is found.
+    The search ends after a step of at most `LAST_STEP` times the depth, if the estimated relative error of the
+    extrapolated drag is at most `error`. `depths` contains the penetrations of the summit; the first guesses are
+    replaced by the solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms of the results with
+    respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS), receives drag, contact
+    fraction and contact slope, and is not changed if no depth is found.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -633,8 +629,8 @@ class NodeToNode:
     def solve(self, level: int, cases: IntArray) -> Solution:
         """Solve cases on a grid of `level` nodes per Nyquist point.
 
-        The first call must be for level 1, and solves all cases. Above level 2, the grid is finer only in blocks in
-        which contact begins or ends. There, heights and slopes are interpolated from 2 nodes per Nyquist point.
+        The first call must be for level 1, and solves all cases. Above level 2, the grid is interpolated from 2 nodes
+        per Nyquist point, and is finer only in blocks in which contact begins or ends.
         """
         if level == 1:
             return self._start()
@@ -666,10 +662,9 @@ class NodeToNode:
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
         """Return the results on a grid, with the errors due to a contact patch that the grid does not resolve.
 
-        A contact patch between two nodes may be missing on two successive grids. Such a patch is at most about one cell
-        long, because a longer patch contains nodes. If the patch were included, the length in contact would increase,
-        and the rms slope of the contact would decrease, because the slope is small near a summit. The relative decrease
-        of the slope is at most half the relative increase of the length.
+        A contact patch of at most about one cell may lie between two nodes, and be missing on two successive grids. The
+        missing patch makes the length in contact too small, and the rms slope of the contact too large, because the
+        slope is small near a summit; the relative error of the slope is at most half that of the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,8 +1,7 @@
 """Steady sliding of a solid over a line, in dimensionless quantities; a case is a pair of speed and load.
 
 Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If `oversampling` is "auto", a closed
-form is also used for full contact of any solid with a rough plane. All other cases are solved on finer and finer grids,
-by one of these solvers:
+form is also used for full contact of any solid with a rough plane. All other cases are solved by one of three modules:
 
 * `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane;
 * `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases in which `node_to_node` misses
@@ -156,10 +155,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Store the results of cases that have no results yet.
-
-    Older results are replaced if the new results meet the accuracy, or if the new error of the drag is smaller.
-    """
+    """Store new results; replace a solution only if the new one is accurate, or has a smaller error of the drag."""
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]
@@ -210,9 +206,8 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
         levels, accuracy = (GENERAL_LEVELS, request.accuracy) if is_auto else (GENERAL_LEVELS[:2], np.inf)
         found = refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS, requested=request.columns)
         _write(results, left, found)
-    # The relative error of the stresses is equal to the tolerance of the depth. In very fast or very slow sliding, the
-    # drag is a small difference of large stresses; the relative error of the drag is then larger than that of the
-    # stresses.
+    # In very fast or very slow sliding, the drag is a small difference of large stresses.
+    # The relative error of the stresses is equal to the tolerance of the depth.
     rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
     errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors

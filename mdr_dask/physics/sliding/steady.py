@@ -35,8 +35,8 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 ITERATIONS = 200
 PATIENCE = 20  # after this number of sweeps, the search continues by bisection
 LOST = 1e-13  # rounding errors dominate if the rise in `_is_lost` is below this fraction of the depth
-# A trail describes the depth as a function of the load near the last sweep. Its five entries are: log depth, log load,
-# slope d(log depth) / d(log load), derivative of this slope with respect to the log load, and Deborah number.
+# A trail describes the depth as a function of the load near the last sweep.
+# Entries of a trail: log depth, log load, slope d(log depth) / d(log load), derivative of the slope, Deborah number.
 TRAIL = 5
 # a lattice depth is a depth with this number of significant binary digits; only such depths are tried
 LATTICE_BITS = 20
@@ -64,14 +64,11 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 
 @jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Update a `trail` (see `TRAIL`) after a sweep at a depth.
-
-    The derivative of the slope follows from the last two sweeps. If these had different Deborah numbers, the derivative
-    is kept, because it hardly depends on the Deborah number.
-    """
+    """Update a `trail` (see `TRAIL`) after a sweep at a depth."""
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
     change = load - trail[1]
+    # a change of the Deborah number hardly changes the derivative of the slope
     bend = (slope - trail[2]) / change if deborah == trail[4] and abs(change) > 1e-12 else trail[3]
     trail[0], trail[1], trail[2], trail[3], trail[4] = np.log(depth), load, slope, bend, deborah
 
@@ -100,11 +97,9 @@ def _solve(
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
-    The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent to this
-    function reaches `load` is an upper bound of the solution, and so is the depth at which full contact carries the
-    load. If a lattice depth carries at most `load`, and the tangent at this depth reaches `load` before the next
-    lattice depth, the search ends there. The result does not depend on the guess in `trail`, because there is only one
-    largest lattice depth that carries at most `load`. `sums` receives the sums at this depth.
+    Full contact gives an upper bound of the depth, and so does each tangent to the carried load, which is a convex,
+    increasing function of the depth. The result does not depend on the guess in `trail`. `sums` receives the sums at
+    the returned depth.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -123,7 +118,7 @@ def _solve(
         if carried <= load:
             low = depth
             best[:] = sums
-            if tangent < _next(depth):
+            if tangent < _next(depth):  # the next lattice depth carries more than `load`
                 return depth, True
         else:
             high = depth
@@ -287,9 +282,9 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
     """Return for each case whether rounding errors dominate the results.
 
-    They do if the line rises very little from the place where contact begins to the highest point. If the dashpots
-    carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of the two nodes next
-    to the highest point, relative to the highest point.
+    Rounding errors dominate if the line rises very little from the place where contact begins to the highest point. If
+    the dashpots carry the load, this rise is `loads` / `deborah`. `near` contains the heights of the two nodes next to
+    the highest point, relative to the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

@@ -1,8 +1,8 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
 The stretch (elongation of the spring) of Prony term m is e_m = u - a_m, where u is the displacement of the element and
-a_m the displacement of the dashpot of the term. Newton's method finds the depth. On a periodic line it also finds the
-values e_m at the start of the line, which must be the same after one period.
+a_m the displacement of the dashpot of the term. Newton's method finds the depth and, on a periodic line, the stretches
+at the first node, which must be the same after one period.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mdr_dask.physics.solids import LinearSolid, recovery_times
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
-LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step; the step itself has a larger error
+LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step
 SWEEPS = 80
 DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one step
 SHORTEST = 1e-9  # in cells; the dashpot and all Prony terms with a smaller tau_m v become one term: see `travelling`
@@ -145,8 +145,8 @@ class ViscoelasticCase:
     ) -> tuple[Outcome, FloatArray, FloatArray]:
         """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The computed depth is the penetration of the highest node. The search starts from the state `start`, which was
-        found on the previous grid. Without a suitable `start`, it starts from the contact at rest.
+        The computed depth is the penetration of the highest node. If `start`, the state on the previous grid, is None
+        or has another number of terms, the search starts from the contact at rest.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -187,9 +187,8 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
 class Swept(NamedTuple):
     """The solid, and the alternating free recoveries and contacts (pieces) of a sweep.
 
-    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). The decay lengths in a free recovery belong to
-    the recovery modes, and in a contact to the Prony terms. `lengths` contains the lengths of the pieces, as in
-    `Passage`.
+    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). A free recovery has the decay lengths of the
+    recovery modes, a contact those of the Prony terms. `lengths` contains the lengths of the pieces.
     """
 
     decayed: FloatArray
@@ -202,9 +201,9 @@ def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatAr
     """Multiply the matrix of derivatives of a Newton step by given changes of the unknowns.
 
     The entries of `direction` are changes of the stretches e_m at the start of the line, and of the depth. `product`
-    receives the changes of the integrals of all e_m, and of the integral of u. The places where contact begins and ends
-    are kept fixed, because u is continuous there, so that their shift has only a second-order effect. If the line is
-    not periodic, the recovery beyond the line is included. `workspace`, shape (3, terms), is overwritten.
+    receives the changes of the integrals of all e_m, and of the integral of u. Shifts of the places where contact
+    begins and ends are neglected, because their effect is of second order. If the line is not periodic, the recovery
+    beyond the line is included. `workspace`, shape (3, terms), is overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -253,10 +252,9 @@ def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
     `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u. `scale` contains
-    the magnitudes of the derivatives of these integrals. With every row divided by its scale, the matrix is the
-    identity plus an operator whose entries are smooth functions of the relaxation times. The singular values of this
-    operator decrease fast, so that four to seven products of the matrix and a vector are enough for any number of
-    terms.
+    the magnitudes of the derivatives of these integrals. The matrix, with every row divided by its scale, is the
+    identity plus a smooth operator with fast decreasing singular values. Therefore four to seven products of the matrix
+    and a vector are enough for any number of terms.
     """
     n = residual.size
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -326,11 +324,11 @@ def solve_sliding(
     """Find the depth at a given load, and on a periodic line also the stretches e_m at the first node.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u. This integral is `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing
-    function of the unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
+    integral of u, `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing function of the
+    unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
 
-    Heights are relative to the highest node, which is the first and the last node of a periodic line. On any other
-    line, elements enter undeformed and recover beyond the end of the line, so that the depth is the only unknown.
+    Heights are relative to the highest node, which is the first and the last node of a periodic line. On a line that is
+    not periodic, elements enter undeformed and recover beyond the end of the line, and the depth is the only unknown.
     `unknown` contains the stretches e_m at the first node, then the depth; the first guesses are replaced by the
     solution. `totals` receives the `totals` of the last `Passage`. Return an `Outcome`, which is `OUTSIDE_LINE` if an
     element is in contact at the end of a line that is not periodic.

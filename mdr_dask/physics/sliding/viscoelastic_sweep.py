@@ -101,8 +101,7 @@ def separation_point(
 def contact_point(low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray) -> float:
     """Return the place t where a free element meets the straight line start + slope (t - low), with low <= t <= high.
 
-    The strain of a free element is a convex function of t. Newton's method therefore converges from `low` without
-    overshooting.
+    Newton's method converges from `low` without overshooting, because the strain of a free element is convex in t.
     """
     point = low
     for _ in range(60):
@@ -140,9 +139,8 @@ def _next_contact(
     """Return the position where an element that is free from `place` on meets the line again, or -1 if it does not.
 
     The search begins in the cell that ends at `node`. If contact ended inside a cell, the search must begin in the next
-    cell, because the strain of the element is convex and does not meet the same straight cell again. The logarithm of a
-    sum of decaying exponentials is convex as well, so that a tangent exponential is a lower bound of the strain. Nodes
-    below this bound are skipped.
+    cell, because the convex strain does not meet the same straight cell again. Nodes below an exponential that touches
+    the strain are skipped: the logarithm of the strain is convex, so that the exponential is a lower bound.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -246,9 +244,9 @@ def _contact(
 ) -> tuple[float, float, float, bool]:
     """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
 
-    Return the final place of the element, the strain and the stress at this place, and whether contact ends there
-    (False: the line ends first). The stretches are written to ``workspace[0]``. The node at which the search for the
-    next contact begins is ``workspace[2, 0]``.
+    Return the final place of the element, the strain and the stress at this place, and whether contact ends before the
+    line. The stretches are written to ``workspace[0]``. The node at which the search for the next contact begins is
+    ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -294,7 +292,7 @@ def _contact(
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:
-    """Write the stretches at the end of a straight piece, and return the stress there; the strain there is `strain`."""
+    """Write the stretches at the end of a straight piece, where the strain is `strain`, and return the stress there."""
     pressure = strain
     for m in range(moduli.size):
         following[m] = factors[0, m] * e[m] + factors[1, m] * slope
