@@ -81,9 +81,9 @@ def refine(
 ) -> Refined:
     """Solve every case on the coarsest grid on which all requested outputs meet `accuracy`.
 
-    The function `solve(level, cases)` solves the cases with the given indices on the grid of a level. It must not raise
-    an exception for a case that fails. Every case is solved on at least two levels, unless it fails because of its
-    parameters. If a case fails on fine grids only, its last solution is returned.
+    The function `solve(level, cases)` solves the cases with the given indices on the grid of a level, and must not
+    raise an exception for a case that fails. Every case is solved on at least two levels, unless it fails because of
+    its parameters. If a case fails on fine grids only, its last solution is returned.
 
     The accuracy of an output is relative to the largest absolute value of the output, or to its entry in `floors` if
     that is larger. If `accuracy` is infinite, the second level is accepted. `order` is the order of convergence of the

@@ -1,7 +1,7 @@
 """Linear viscoelastic solids: moduli, Prony series fitted to data, and shifts to other temperatures.
 
-The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``. Here a_m is the strain of the dashpot
-of Prony term m, with ``da_m/dt = (u - a_m) / tau_m``.
+The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``, where a_m is the strain of the
+dashpot of Prony term m, with ``da_m/dt = (u - a_m) / tau_m``.
 """
 
 from __future__ import annotations
@@ -57,8 +57,7 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
     Parameters
     ----------
     static_modulus : float
-        G_inf, Pa. It must be positive, because without a static modulus a periodic contact carries no load in the
-        steady state.
+        G_inf > 0, Pa. Without a static modulus, a periodic contact would carry no load in the steady state.
     moduli, times : array_like, shape (terms,)
         G_m >= 0, Pa, and tau_m > 0, s.
     viscosity : float
@@ -296,9 +295,9 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the decay times lambda_k of free recovery, which are the zeros of 1 + sum weight_m / (tau_m - lambda).
 
-    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. The times
-    tau_m must be ascending and distinct. Then lambda_k lies between tau_k and tau_(k+1), and the largest lambda_k lies
-    above the largest tau_m. The second result contains tau_m - lambda_k in row m and column k.
+    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. With
+    ascending, distinct times tau_m, lambda_k lies between tau_k and tau_(k+1), and the largest lambda_k lies above the
+    largest tau_m. The second result contains tau_m - lambda_k in row m and column k.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))

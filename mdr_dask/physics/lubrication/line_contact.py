@@ -127,7 +127,7 @@ class LineSolution:
     """The film of a line contact in Hertz units; if no film was found, `outcome` and `reason` give the cause.
 
     `grids` are the solutions on all grids, the finest last. `central_film` and `minimum_film` are in units of
-    ``a^2/R``. Without a film, `grids` is empty and both films are NaN.
+    ``a^2/R``. Without a film, `grids` is empty, and `central_film` and `minimum_film` are NaN.
     """
 
     case: LineContact

@@ -1,10 +1,10 @@
 """Steady sliding of a Kelvin foundation along a periodic line: a fast, approximate solver for many cases at once.
 
 The unit of length is the cell width: neighbouring nodes have the distance 1, and the Deborah number De is the distance
-v tau in cells. Inside a cell, the penetration w (depth plus height) is a cubic. The places where contact begins and
-ends are computed approximately. The load is the integral of w in contact and of u out of contact. The drag is the
-integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of the drag are positive, so that nothing
-cancels in slow sliding. In full contact the results are exact on any grid.
+v tau divided by the cell width. Inside a cell, the penetration w (depth plus height) is a cubic. The places where
+contact begins and ends are computed approximately. The load is the integral of w in contact and of u out of contact.
+The drag is the integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of the drag are positive,
+so that nothing cancels in slow sliding. In full contact the results are exact on any grid.
 
 If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms.
 In all other blocks, the solver follows one element from cell to cell. The results of a case are the same if further
@@ -32,7 +32,7 @@ from mdr_dask.physics.surfaces.waves import series
 
 BLOCK = 32  # number of cells in a block
 WING = 4  # number of nodes on each side of a cell from which the finer nodes in the cell are interpolated
-BEFORE, AFTER = WING + 1, WING + 2  # `refine` needs these numbers of nodes before and after the period
+BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes that `refine` needs before and after the period
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
 # Columns of `Nodes.blocks`. PEAK bounds the height; LOWEST and STEEPEST are the smallest nodal height and slope.
@@ -216,8 +216,8 @@ def weights(refinement: int) -> FloatArray:
 
     The first index is 0 for the interpolated height and 1 for the slope. The second index numbers the finer nodes
     inside a cell. The third index runs over the heights at the `WING` nodes on each side of the cell, and then over the
-    slopes at these nodes. The Hermite polynomial through these values has degree 15. With two nodes per Nyquist point,
-    the error is below 1e-7 times the amplitude of the shortest wave.
+    slopes at these nodes. The interpolating Hermite polynomial has degree 15. With two nodes per Nyquist point, the
+    error is below 1e-7 times the amplitude of the shortest wave.
     """
     places, x = np.arange(1.0 - WING, 1.0 + WING), np.arange(refinement) / refinement
     table = np.empty((2, refinement, 4 * WING))
@@ -518,7 +518,7 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # order: the cell of the summit, where every case is in contact; the blocks; the cells after the last block
+    # first the cell of the summit, where every case is in contact, then the blocks, then the cells after the last block
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:

@@ -58,8 +58,8 @@ class Request:
     `accuracy` is the allowed relative error; for small results see `FLOORS`. `oversampling` is the number of nodes per
     Nyquist point; "auto" selects the smallest number that meets the accuracy. The scheme for a Kelvin solid is
     "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). `with_errors` = False omits the error
-    estimates, but only for a Kelvin solid on a given grid. `contact` states whether contact fraction and contact slope
-    are requested; these two need finer grids than drag and depth.
+    estimates, but only for a Kelvin solid on a given grid. `contact` requests contact fraction and contact slope, which
+    need finer grids than drag and depth.
     """
 
     accuracy: float = 0.01

@@ -252,9 +252,9 @@ def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
     `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u. `scale` contains
-    the magnitudes of the derivatives of these integrals. The matrix, with every row divided by its scale, is the
-    identity plus a smooth operator with fast decreasing singular values. Therefore four to seven products of the matrix
-    and a vector are enough for any number of terms.
+    the magnitudes of the derivatives of all integrals. The matrix, with every row divided by its scale, is the identity
+    plus a smooth operator with fast decreasing singular values, so that four to seven products of the matrix and a
+    vector are enough for any number of terms.
     """
     n = residual.size
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -324,8 +324,8 @@ def solve_sliding(
     """Find the depth at a given load, and on a periodic line also the stretches e_m at the first node.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u, `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing function of the
-    unknowns. Therefore, after the first step, Newton's method approaches the solution from above.
+    integral of u, `strain_area` = F_N / (4 G_inf dx). After the first step, Newton's method approaches the solution
+    from above, because the displacement is a convex, increasing function of the unknowns.
 
     Heights are relative to the highest node, which is the first and the last node of a periodic line. On a line that is
     not periodic, elements enter undeformed and recover beyond the end of the line, and the depth is the only unknown.
