@@ -20,9 +20,10 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True)
 class Statistic:
-    """One reduction over ``realisation``: its name, its meaning and the function that computes it.
+    """One reduction over ``realisation``: a name, a meaning and a function that computes the reduction.
 
-    The function takes an output and its companion (or None), and returns None if it needs a missing companion.
+    The function takes an output and the companion of the output (None if missing). If the statistic cannot be computed
+    without a companion, the function returns None.
     """
 
     name: str
@@ -41,7 +42,7 @@ def mean(array: xr.DataArray) -> xr.DataArray:
 
 
 def standard_deviation(array: xr.DataArray) -> xr.DataArray:
-    """Return the standard deviation of the successful realisations; NaN for fewer than two."""
+    """Return the standard deviation of the successful realisations; NaN if fewer than two succeeded."""
     spare = count(array) - 1
     squares: xr.DataArray = (array - mean(array)) ** 2
     variance: xr.DataArray = squares.sum("realisation") / spare.where(spare > 0)
@@ -60,7 +61,7 @@ def grid_error(error: xr.DataArray) -> xr.DataArray:
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the ends of the bootstrap interval of the mean, including the discretisation error, along ``bound``."""
+    """Return the lower and the upper end of the 95 % interval of the mean, along a new dimension ``bound``."""
     count = array.sizes["realisation"]
     if error is not None:
         array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
@@ -69,9 +70,10 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 
 
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
-    """Return the mean, and both ends of the interval of the mean (see `interval`).
+    """Return the mean, the lower end and the upper end of the interval of the mean (see `interval`).
 
-    With one realisation, the interval is the mean plus or minus the discretisation error, or NaN if it is unknown.
+    With one realisation, the interval is the mean plus or minus the discretisation error. If the discretisation error
+    is unknown, the ends are NaN.
     """
     array, error = array.compute(), None if error is None else error.compute()
     middle, ends = mean(array), interval(array, error)
@@ -149,13 +151,13 @@ NAMES = tuple(statistic.name for statistic in STATISTICS)
 
 
 def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
-    """Return the discretisation errors of an output, or None if the dataset has none."""
+    """Return the discretisation errors of an output, or None if the dataset does not contain these errors."""
     name = dataset[output].attrs.get("ancillary_variables")
     return dataset[name] if name in dataset.data_vars else None
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
-    """Return statistics over the realisations of a group of a store, as variables ``<output>_<statistic>``."""
+    """Return statistics over the realisations of a dataset, as variables ``<output>_<statistic>``."""
     for name in statistics:
         if name not in NAMES:
             raise DataError(f"no statistic is called {name!r}{did_you_mean(name, NAMES)}")

@@ -1,8 +1,8 @@
 """Bootstrap intervals from the scatter of realisations and from the discretisation errors of results.
 
 A *stack* is an array with three kinds of rows, in this order: one row with the mean; `RESAMPLES` rows with means of
-resampled realisations; and rows in which the mean is shifted by its discretisation errors. A fit is applied to every
-row, and `interval` computes the interval of a constant from the stack of fitted constants.
+resampled realisations; and rows in which the mean is shifted by discretisation errors. A fit is applied to every row,
+and `interval` computes the interval of a constant from the stack of fitted constants.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
-#: Number of resamples; the ends of an interval are then accurate to about 5 % of its width.
+#: Number of resamples. With 400 resamples, the ends of an interval are accurate to about 5 % of the width of the
+#: interval.
 RESAMPLES = 400
-#: Largest number of groups of values that are shifted, or left out, together.
+#: Largest number of groups of values. The values of one group are shifted, or left out, together.
 GROUPS = 32
-#: Probabilities of the ends of an interval.
+#: Cumulative probabilities at the lower and the upper end of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
 #: Smallest number of resamples from which the ends of an interval are computed.
 FEWEST = round(1 / TAILS[0])
-#: Number that replaces the logarithm of a value that is not positive; its exponential is 0 in double precision.
+#: Value that replaces the logarithm of a number that is not positive. In double precision, exp(NOTHING) is 0.
 NOTHING = -1000.0
 
 
@@ -51,15 +52,15 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values, with NaN in realisations (first axis) in which any value is not finite."""
+    """Return the values; a realisation (first axis) with a value that is not finite becomes NaN in all values."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return two rows for each group of neighbouring values: one with the group shifted up, one with it shifted down.
+    """Return two rows for each group of neighbouring values: the group is shifted up in one row, and down in the next.
 
-    A value is shifted by its error, or by its own absolute value if the error is infinite.
+    A value is shifted by the error of this value. If the error is infinite, the value is shifted by its absolute value.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -72,14 +73,15 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return a stack with additional rows in which the mean is shifted by its errors (see `moved`)."""
+    """Return a stack with additional rows in which the mean is shifted by `errors` (see `moved`)."""
     return np.concatenate([stack, moved(stack[0], errors)]) if np.any(errors > 0) else stack
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the stack of `one` minus `other`; both stacks must have the same resamples.
+    """Return the stack of the difference `one` minus `other` of two stacks with the same resamples.
 
-    In the last rows, the difference is shifted first by the errors of `one`, then by the errors of `other`.
+    After the resamples, rows with shifts by the errors of `one` come first, then rows with shifts by the errors of
+    `other`.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -95,7 +97,7 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum, over all groups, of the largest positive shift in the two rows of the group."""
+    """Return a sum over all groups: each group contributes the larger positive shift (or 0) of its two rows."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
@@ -109,11 +111,11 @@ def regrouped(stack: FloatArray) -> FloatArray:
 
 
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of 95 % intervals from a stack; with `positive`, they are computed from logarithms.
+    """Return the ends of 95 % intervals from a stack; with `positive`, from the logarithms of the stack.
 
-    With few realisations (`count`), the percentiles of the resamples lie too close to the mean; `widening` multiplies
-    their distances from the mean. Shifts by discretisation errors are added linearly, because an error that is the same
-    in every realisation does not average out.
+    With few realisations (`count`), the percentiles of the resamples lie too close to the mean. The distances of the
+    percentiles from the mean are therefore multiplied by `widening`. Shifts by discretisation errors are added
+    linearly, because an error that is the same in every realisation does not average out.
     """
     values = logarithms(stack) if positive else stack
     enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
@@ -131,7 +133,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 def widening(count: ArrayLike) -> FloatArray:
     """Return sqrt(n / (n - 1)) t / z for n = `count` realisations.
 
-    Here t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, and z the same quantile
+    Here t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, and z is the 97.5 % quantile
     of the normal distribution.
     """
     from scipy.special import ndtri, stdtrit
@@ -142,17 +144,17 @@ def widening(count: ArrayLike) -> FloatArray:
 
 
 def chance(residuals: FloatArray, count: int) -> float:
-    """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
+    """Return the probability that scatter and errors alone cause at least the rms residual of the data.
 
-    `residuals` is a stack of the differences between data and law. If the law holds, the first row (the data) is about
-    as large as the change of the residuals in a resample. The result is NaN for too few resamples.
+    `residuals` is a stack of the differences between data and law. If the law holds, the residuals of the data (first
+    row) are about as large as the changes of the residuals in a resample. The result is NaN for too few resamples.
     """
     caused = _caused(residuals, count)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
 
 
 def scatter(residuals: FloatArray, count: int) -> float:
-    """Return the rms residual that scatter and errors alone exceed with a probability of 5 %; NaN if unknown."""
+    """Return the rms residual that scatter and errors alone exceed with probability 5 %; NaN for too few resamples."""
     caused = _caused(residuals, count)
     return float(np.quantile(caused, CONFIDENCE, method="higher")) if caused.size else np.nan
 

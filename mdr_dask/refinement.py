@@ -1,8 +1,8 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Every new value lies halfway between two older values, so that cases that differ in other parameters use the same values
-of the axis. To test an interval, the output is predicted from older values only; the interval is halved if the error of
-the prediction exceeds the tolerance.
+Every new value lies halfway between two older values. Cases that differ in other parameters therefore use the same
+values of the axis. To test an interval, the output is predicted from the results at older values only. The interval is
+halved if the error of the prediction exceeds the tolerance.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
-#: Least width of an interval, as a fraction of the axis, which limits the number of values at a discontinuity.
+#: Least width of an interval, as a fraction of the axis. This width limits the number of values at a discontinuity.
 FINEST = 2.0**-10
 #: Intervals are always halved until one end has at least this level (3: the eighths of the axis). The outputs at the
 #: quarters (level 2) are predicted from only three values, and the prediction may be right by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
-#: the end that was added later, as fractions of the length of the interval.
+#: the end that was added to the axis later, as fractions of the length of the interval.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
@@ -41,7 +41,7 @@ class Mean:
     # Shape (1 + groups, cases...): the means over all realisations, then the means without each group of realisations.
     # A case without a successful realisation is NaN.
     groups: FloatArray
-    # Shape (cases...): discretisation error of the mean of each case, 0 if it is unknown.
+    # Shape (cases...): discretisation error of the mean of each case, 0 for an unknown error.
     error: FloatArray
 
     @classmethod
@@ -68,7 +68,7 @@ def _mean(values: FloatArray, some: BoolArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The cases of a series in one stage: the values of every axis, and which of their combinations are needed."""
+    """The cases of a series in one stage: the values of every axis, and which combinations of values are needed."""
 
     # The series, with the values of adaptive axes in the order in which they were added.
     series: Series
@@ -95,7 +95,7 @@ class Mesh:
 
     @property
     def cases(self) -> BoolArray:
-        """Mask of the needed cases; its dimensions are the axes of the series."""
+        """Mask of the needed cases. The dimensions of the mask are the axes of the series."""
         dims = len(self.series.sizes)
         others = [k for k in range(dims) if k not in self.used]
         each = (
@@ -145,7 +145,7 @@ class _Interval:
     """An interval of an adaptive axis whose interpolation error exceeds the tolerance or was not tested.
 
     `case` is the index of the combination of non-adaptive values. The middle (`share`) and the width are fractions of
-    the axis. `excess` is the interpolation error divided by the tolerance, at least 1.
+    the axis. `excess` is the interpolation error divided by the tolerance, or 1 if this ratio is below 1.
     """
 
     case: tuple[int, ...]
@@ -158,7 +158,7 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
     `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, the number of
-    combinations of non-adaptive values that miss the tolerance although none of their intervals may be halved.
+    combinations of non-adaptive values that miss the tolerance although no interval of the combination may be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -258,11 +258,11 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     In the two intervals next to a value of level n, the output is predicted from all values of lower levels, once by a
     monotone cubic and once by a cubic spline. The error is the largest difference between the predictions and the
     monotone cubic through all values, minus an allowance for the scatter of the realisations and the discretisation
-    errors. It may be negative.
+    errors. The result may be negative.
 
     `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
     middle, 2 at the quarters, ... The shape of the means `groups` is (1 + groups, lines, values), as in `Mean.groups`,
-    and the shape of their discretisation errors `error` is (lines, values).
+    and the shape of the discretisation errors `error` of these means is (lines, values).
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

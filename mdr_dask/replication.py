@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: Least and largest factor by which a round multiplies the number of realisations. The least factor avoids many rounds;
-#: the largest factor is limited because a few results give only a poor estimate of the scatter.
+#: Least and largest factor by which a round multiplies the number of realisations. The least factor avoids many rounds.
+#: The largest factor is limited, because a few results give only a poor estimate of the scatter.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Least number of results with which the estimated standard error alone decides whether a case stops. With fewer, only
-#: 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
+#: Least number of results with which the estimated standard error alone decides whether a case stops. With fewer
+#: results, only 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
 FEWEST = 12
 #: A case also stops if its standard error is below this fraction of the tolerance.
 NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round, from the number so far and from `growth_needed`."""
+    """Return the number of realisations after the next round, from the present number and from `growth_needed`."""
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
         return count
@@ -37,7 +37,7 @@ def growth_needed(
     until: Mapping[str, Tolerance],
     scatter: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
-    """Return, for each case, the factor by which the number of results must grow: at most 1 if the case has enough.
+    """Return, for each case, the factor by which the number of results must grow (at most 1 if the number is enough).
 
     `values` and `scatter` (the standard error estimated within each realisation) have the shape (..., realisations).
     `until` limits the standard error of the mean of each output. A case has enough results if the standard error is
@@ -61,7 +61,7 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return, for each output with a tolerance, the output (if any) that estimates its scatter from one realisation."""
+    """Return, for each output with a tolerance, the output (if any) that estimates the scatter from one realisation."""
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
@@ -75,7 +75,7 @@ def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[
 
 
 def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the standard error of a mean from the standard errors of its independent realisations."""
+    """Return the standard error of a mean from the standard errors of the independent realisations."""
     count = np.maximum(done.sum(axis=-1), 1)
     return np.asarray(np.sqrt((np.where(done, scatter, 0.0) ** 2).sum(axis=-1)) / count)
 

@@ -7,7 +7,8 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules with a tuple ``FITS``, and the models whose stores its fits accept; an empty tuple means all models.
+#: For each module with a tuple ``FITS``, the models whose stores the fits of the module accept. An empty tuple means
+#: all models.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),
@@ -24,7 +25,7 @@ GROUP = "mdr_dask.fits"
 
 
 def available(model: str) -> dict[str, Fit]:
-    """Return the fits for stores of a model, indexed by name, including those that other packages offer in `GROUP`."""
+    """Return the fits for stores of a model, indexed by name, including fits that other packages offer in `GROUP`."""
     subjects = [subject for subject, models in SUBJECTS.items() if model in models or not models]
     own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in subjects)
     others = (entry.load() for entry in entry_points(group=GROUP))

@@ -14,10 +14,10 @@ from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
 #: Change of the data by which derivatives are computed: a shift of the results of a case, in standard errors, or a
-#: fraction of the scatter. It is so small that the fit still selects the same cases.
+#: fraction of the scatter. The change is so small that the fit still selects the same cases.
 STEP = 1e-3
-#: A group of cases needs no more realisations if a shift of its results by one standard error changes the constant by
-#: less than this fraction of the half width of the interval of the constant.
+#: A group of cases needs no more realisations if a shift of the results of the group by one standard error changes the
+#: constant by less than this fraction of the half width of the interval of the constant.
 NEGLIGIBLE = 0.01
 
 
@@ -55,7 +55,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return which intervals are wider than the tolerance; an interval with an infinite or NaN end counts as narrow."""
+    """Return which half widths of intervals exceed the tolerance; an infinite or NaN half width counts as narrow."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -67,8 +67,8 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
     """Return, for each series, the half width that the interval of a constant would have without scatter.
 
-    The fit is repeated with slightly less and with slightly more scatter. Each half width is extrapolated linearly to
-    zero scatter, and the smaller result is used.
+    The fit is repeated with slightly less and with slightly more scatter. Each of the two half widths is extrapolated
+    linearly to zero scatter. The smaller of the two results is returned.
     """
     now = half_widths(fit, constant, groups)
 
@@ -115,9 +115,9 @@ def cases_behind(
 ) -> xr.DataArray:
     """Return the cases of the series `name` that influence constants whose interval is too wide.
 
-    `wide` marks the constants with such an interval. Along each dimension of the series that `wide` lacks, neighbouring
-    cases form groups. The results of one group are shifted, and the fit is repeated. A case is chosen if, along every
-    dimension with groups, the shift of its group changes a marked constant.
+    `wide` marks the constants whose interval is too wide. Along each dimension of the series that `wide` lacks,
+    neighbouring cases form groups. The results of one group are shifted, and the fit is repeated. A case is chosen if,
+    along every dimension with groups, the shift of the group with this case changes a marked constant.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -158,7 +158,7 @@ def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
 
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
-    """Return small random shifts for the outputs of all cases; equal shifts would cancel in differences of cases."""
+    """Return small random shifts for the outputs of all cases, because equal shifts would cancel in differences."""
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
     for key in _results(data):

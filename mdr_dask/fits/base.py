@@ -1,4 +1,4 @@
-"""The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
+"""The class `Fit`: a law, with a function that fits the constants of the law to a store and tests the law.
 
 Every result has a sentence ``law_holds`` on whether the law holds with the constants that the publication of the law
 states. The sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, a second
@@ -24,7 +24,8 @@ WITHIN = 0.05
 #: A law holds approximately if the rms relative deviation is at most this value, and the largest relative deviation is
 #: at most twice this value.
 APPROXIMATE = 0.15
-#: Deviations count against a law if scatter and errors alone would cause such deviations with a probability below this.
+#: Deviations count against a law if scatter and errors alone would cause such deviations with a probability below this
+#: value.
 DOUBTFUL = 0.05
 
 
@@ -33,11 +34,11 @@ class Fit:
     """A law that ``mdr-dask fit STORE NAME`` fits to the stores of some `models`; an empty tuple means all models.
 
     `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
-    realisation, ...), and all scalar parameters as coordinates. `compute` returns constants with the ends of their 95 %
-    intervals (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``, with units in
-    the attrs. If `apart` is true, `compute` takes one series at a time. `constants` contains the names of all constants
-    that have an interval; a campaign may use these names in ``until``. `constants` is a function of the campaign if the
-    names depend on the campaign.
+    realisation, ...), and all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 %
+    intervals of the constants (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``.
+    The attrs contain the units. If `apart` is true, `compute` takes one series at a time. `constants` contains the
+    names of all constants that have an interval; a campaign may use these names in ``until``. `constants` is a function
+    of the campaign if the names depend on the campaign.
     """
 
     name: str
@@ -122,10 +123,10 @@ def fitted(
 ) -> Fitted:
     """Fit a law to a stack of data, shape (rows, cases).
 
-    `fit` returns the constants, shape (rows, p), which are exponents or logarithms of factors; `left` returns data
-    minus law. If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by
-    the residuals, so that the intervals become wider. A constant is NaN if the function `undetermined` marks it at the
-    fitted or at the `stated` constants.
+    `fit` returns the constants, shape (rows, p): exponents or logarithms of factors. `left` returns data minus law. If
+    scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the residuals.
+    These fits make the intervals wider. A constant is NaN if `undetermined` marks the constant from the derivatives at
+    the fitted or at the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -143,8 +144,9 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine, from the derivatives of the law, shape (cases, p).
 
-    A constant is changed by 1, and the other constants are fitted again. If the values of the law then change by less
-    than `WITHIN` in every case, the constant is undetermined, because such small deviations do not count against a law.
+    A constant is changed by 1, and the remaining constants are fitted again. If the values of the law then change by
+    less than `WITHIN` in every case, the constant is undetermined, because such small deviations do not count against a
+    law.
     """
     largest = np.empty(effects.shape[1])
     for k in range(largest.size):
@@ -166,8 +168,8 @@ def verdict(
     """Return a sentence on whether a law holds, from a stack of the relative deviations of the data from the law.
 
     `constants` is the number of constants that were fitted to the data. `where` describes a case in words. `excluded`
-    means that the interval of a fitted constant does not contain the stated value; the deviations are then not due to
-    scatter.
+    is true if the interval of a fitted constant does not contain the stated value. In this case, the deviations are not
+    due to scatter.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)

@@ -73,7 +73,7 @@ class Calibration:
 
     @cached_property
     def products(self) -> list[identifiability.Product]:
-        """Products of powers of undetermined unknowns; the data determine these products, but not their factors."""
+        """Products of powers of undetermined unknowns; the data determine the products, but not the unknowns."""
         return identifiability.products(self.posterior, self.values, self.free)
 
     def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
@@ -126,13 +126,15 @@ class Calibration:
 def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     """Estimate the one to four unknowns of a grid study from measured points.
 
-    The prior of an unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically. The
-    measured values are assumed to be normally distributed about the prediction. Their covariance has three parts:
-    measurement errors; scatter of the rough lines, common to all points; and errors of grid and interpolation. Half of
-    each grid and interpolation error is common to all points, the other half is independent for each point.
+    The prior of an unknown is uniform over the axis of the unknown. If the axis is spaced logarithmically, the prior is
+    uniform over the logarithm of the unknown. The measured values are assumed to be normally distributed about the
+    prediction. The covariance of the measured values has three parts: measurement errors; scatter of the rough lines,
+    common to all points; and errors of grid and interpolation. Half of each error of grid and interpolation is common
+    to all points. The remaining half is independent for each point.
 
-    If the table contains no measurement errors, the logarithm of their size has a uniform prior. The measurement errors
-    are then assumed to be either equal for all points, or proportional to the predicted values.
+    If the table contains no measurement errors, the logarithm of the size of the measurement errors has a uniform
+    prior. The measurement errors are then assumed to be either equal for all points, or proportional to the predicted
+    values.
     """
     if measured.errors is not None and not measured.errors.all():
         raise FitError(f"{measured.source}: {ZERO}")
@@ -157,7 +159,7 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
-    """Return possible measurement errors, which are about as large as the residuals.
+    """Return possible measurement errors that are about as large as the residuals.
 
     The first item has equal errors for all points. If all measured values are positive, a second item has errors that
     are proportional to the predicted values.
@@ -190,8 +192,8 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the measurement error, from the rms `residual` of the best prediction.
 
-    The true error exceeds the largest size with a probability of 0.1 %, or with a larger one if the largest size is
-    limited to 100 times `residual`.
+    The true error exceeds the largest size with a probability of 0.1 %. This probability is larger if the largest size
+    is reduced to the limit of 100 times `residual`.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -199,7 +201,7 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
 
 
 def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
-    """Return the measured points that are stored with a study. If the table has several outputs, one of `wanted`."""
+    """Return the measured points stored with a study; if the table has several outputs, use one of `wanted`."""
     table = dataset.attrs.get("measured")
     if not table:
         raise FitError(

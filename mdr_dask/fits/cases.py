@@ -28,7 +28,7 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law to the cases along some dimensions, for each combination of values along the other dimensions.
+    """Fit a law to the cases along some dimensions, for each combination of values along the remaining dimensions.
 
     One fit uses all cases along the dimensions that the function `inner` returns. The first output must have no
     dimensions except the axes of the study and ``realisation``.
@@ -57,7 +57,7 @@ def dimensions(data: xr.Dataset, *names: str) -> list[str]:
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return the value of a parameter that is equal in all cases; raise FitError if it is missing or varies."""
+    """Return the value of a parameter that is equal in all cases; raise FitError if this value is missing or varies."""
     require(data, name)
     values = data[name]
     if values.size != 1:
@@ -68,7 +68,7 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 class Table(NamedTuple):
-    """Values of an output and their discretisation errors, shape (cases, realisations), both divided by a scale.
+    """Values of an output, and discretisation errors of the values, divided by a scale; shape (cases, realisations).
 
     `columns` contains further numbers of each case, such as the load and the velocity.
     """
@@ -158,8 +158,8 @@ def nonlinear(
     """Fit a law to a stack of logarithms, and test the law with the stated and with the fitted constants.
 
     The function `model` takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1,
-    cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row of `logs`;
-    the constants of the other rows follow by linearisation.
+    cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row of `logs`.
+    The constants of the other rows follow by linearisation.
     """
 
     def misfit(constants: FloatArray) -> FloatArray:
@@ -194,7 +194,7 @@ def rms(left: FloatArray) -> float:
 def constant(
     name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False, unit: str = "1"
 ) -> Variables:
-    """Return the result variables of a constant: its value and the ends of its interval."""
+    """Return the result variables of a constant: the value of the constant and the ends of the interval."""
     low, high = bootstrap.interval(stack, count, positive)
     values = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
     return {key: xr.Variable((), value, {"units": unit, "long_name": long_name}) for key, value in values.items()}

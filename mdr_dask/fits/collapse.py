@@ -24,7 +24,7 @@ LOG = float(np.log(10.0))  # factor that converts a small deviation in decades i
 def laws_of(
     result: Superposition, over: str, unit: str, reference: float, *, is_temperature: bool
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
-    """Fit laws of the shift factors, and return for each law a sentence on whether the law holds.
+    """Fit laws of the shift factors. Return the fitted laws, and for each law a sentence on whether the law holds.
 
     If the groups are velocities, the law is a power law. If the groups are temperatures, the laws are Arrhenius' law
     and the WLF law of log10 a_T. All laws are fitted relative to the middle group, so that the fit does not depend on

@@ -81,7 +81,7 @@ def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
 
 
 def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
-    """Return the rows with a finite number in every column, and a sentence about omitted rows, if any."""
+    """Return the rows with a finite number in every column, and a sentence about omitted rows (or an empty text)."""
     missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
     anywhere = np.logical_or.reduce(list(missing.values()))
     if not anywhere.any():
@@ -97,7 +97,8 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
     If no column has this name, return the first column whose name is a synonym.
 
-    Return None if no name is a synonym, or if several names are synonyms but the columns contain different quantities.
+    Return None if no name is a synonym, or if several names are synonyms but the columns do not contain the same
+    quantity.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -107,7 +108,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
 
 def _agree(one: pd.Series, other: pd.Series) -> bool:
-    """Return whether two columns may be one quantity in two units: their ratio or their difference is constant."""
+    """Return whether two columns may be one quantity in two units: the ratio or the difference is constant."""
     first, second = one.to_numpy(dtype=np.float64), other.to_numpy(dtype=np.float64)
     with np.errstate(all="ignore"):
         return any(np.ptp(each) <= AGREE * abs(np.median(each)) for each in (second / first, second - first))
@@ -139,7 +140,7 @@ FAMILIES = (
 def columns_to_use(
     frame: pd.DataFrame, abscissa: str | None, ordinate: str | Sequence[str] | None, group: str | None
 ) -> tuple[str, tuple[str, ...], str]:
-    """Return the names of the columns of abscissa, ordinates and group.
+    """Return the names of the columns with the abscissa, the ordinates and the group.
 
     Columns that are not given are taken from the first of the `FAMILIES` that fits the table.
     """
@@ -191,10 +192,10 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
 
 
 def second_group(frame: pd.DataFrame, used: Sequence[str]) -> str | None:
-    """Return the column of a further velocity or temperature in which the curves differ; None if there is none.
+    """Return the column of a further velocity or temperature in which the curves differ, or None if no column does.
 
-    In a table of moduli against time or frequency, forces and velocities are ignored, because they are readings of the
-    instrument.
+    In a table of moduli against time or frequency, forces and velocities are readings of the instrument and are
+    ignored.
     """
     found = None
     of_moduli = not any(_is(name, "friction_coefficient") for name in used) and any(
@@ -215,7 +216,7 @@ def second_group(frame: pd.DataFrame, used: Sequence[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the value of `by` of each curve, and log10 of abscissae and of ordinates, shape (ordinates, points)."""
+    """Return for each curve the value of `by`, and log10 of its abscissae and ordinates, shape (ordinates, points)."""
     rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
     if rows.size == 0 or np.any(rows <= 0):
         names = " and ".join(repr(name) for name in (over, *ordinates))
@@ -249,11 +250,11 @@ def pairs_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Divide measured values, which scatter about a few set values, into groups; return each value's group index.
+    """Divide measured values, which scatter about a few set values, into groups; return the group index of each value.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. But close values that alternate within one sweep of the abscissa form one
-    group, because they are rounded readings of one set value.
+    each distinct value is a group of its own. But close values that alternate within one sweep of the abscissa are
+    rounded readings of one set value, and form one group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

@@ -40,13 +40,14 @@ from mdr_dask.physics.surfaces import roughness
 
 MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
-# smallest and largest load F_N / (G h L) of the fit in zone 1; other limits change alpha by up to 0.02, beta by 0.14
+# smallest and largest load F_N / (G h L) of the fit in zone 1. Other limits change alpha by up to 0.02 and beta by up
+# to 0.14.
 ZONE_ONE = (0.01, 0.3)
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the rms slope of the line, from the store or from its spectrum; NaN for a smooth line."""
+    """Return the rms slope of the line, read from the store or computed from the spectrum; NaN for a smooth line."""
     if "rms_slope" in data:
         stored = data["rms_slope"].mean("realisation")
         return stored.where(stored > 0)
@@ -92,10 +93,10 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
+    """Return the index of the lowest velocity at which friction is proportional to the velocity; None if it never is.
 
     Friction counts as proportional if mu / v at the next velocity differs by less than the fraction `WITHIN`. The index
-    need not be 0: the time stepping of the original papers makes friction at very low velocities too large.
+    may be above 0, because the time stepping of the original papers makes friction at very low velocities too large.
     """
     if velocity.size == 1:
         return 0
@@ -197,7 +198,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return dimensionless velocities, or v tau in m if the study has no rms height; also return a format string."""
+    """Return the dimensionless velocities (v tau in m if the study has no rms height), and a format string for them."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
@@ -206,7 +207,8 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    `x` contains the logarithms of the velocities, and `ends` both ends of the interval of the slope `found.rise`.
+    `x` contains the logarithms of the velocities, and `ends` contains both ends of the interval of the slope
+    `found.rise`.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
@@ -225,7 +227,7 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which `known` cases are in regions I to III: up to the velocity of the largest friction at each load."""
+    """Return which `known` cases are in regions I to III, up to the velocity of the largest friction at each load."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

@@ -16,17 +16,19 @@ from mdr_dask.fits.posterior import Posterior
 OPEN = 2.0
 #: The axis cuts off the 95 % interval of an unknown if the density at an end of the axis exceeds 5 % of the maximum.
 CUT = float(np.log(20))
-#: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
+#: An unknown without an open end is undetermined if unknowns with an open end explain more than this share of its
+#: variance.
 LINKED = 0.25
 #: The data determine a product if the spread of its logarithm is less than this fraction of the spread in the prior.
 NARROW = 0.25
 #: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
 #: at most this factor.
 ROUNDED = 1.15
-#: Probability of each interval. The keys are the suffixes of the ends: ``x_low``, ``x_high``; ``x_low_68``,
-#: ``x_high_68``.
+#: Probability of each interval. Each key is the last part of the names of the ends: nothing in ``x_low`` and
+#: ``x_high``, ``_68`` in ``x_low_68`` and ``x_high_68``.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: `ENDS`: suffixes of the median and of the ends of the intervals. `SHARES`: cumulative probability at each of them.
+#: `ENDS`: suffixes of the median and of the ends of the intervals. `SHARES`: cumulative probabilities of the median and
+#: of the ends.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -39,7 +41,7 @@ def at_ends(found: Posterior) -> FloatArray:
 
 
 def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
-    """Return the indices of the unknowns that have an open end, or that depend on such unknowns (see `LINKED`)."""
+    """Return the indices of the unknowns with an open end, and of the unknowns that depend on these (see `LINKED`)."""
     free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:
         return []

@@ -22,9 +22,9 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
 
     The mean over realisations is interpolated by monotone cubics (PCHIP) along one axis after the other. Each axis is
-    linear or logarithmic, as `Scale.of` chooses. An axis of words, or an axis with fewer than `FEWEST`
-    numbers, receives no new values. The error is the half width of the 95 % interval of the mean plus the error of
-    interpolation, which is estimated by leaving out every second value.
+    linear or logarithmic, as `Scale.of` chooses. An axis of words, or an axis with fewer than `FEWEST` numbers,
+    receives no new values. The error is the half width of the 95 % interval of the mean plus the error of
+    interpolation. The error of interpolation is estimated by leaving out every second value.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -148,7 +148,7 @@ class Law:
     def __call__(self, **places: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return values and errors (half widths of 95 % intervals) at given values of all axes, in SI units.
 
-        Arrays are broadcast against each other. DataError is raised outside the range of an axis.
+        Arrays are broadcast against each other. DataError is raised if a value is outside the range of its axis.
         """
         points = np.stack(np.broadcast_arrays(*self._checked(places).values()), axis=-1)
         found = self._interpolate(points).reshape(*points.shape[:-1], 2)

@@ -9,10 +9,11 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Smallest number of values along an axis; if every second value is left out, the others must still determine a curve.
+#: Smallest number of values along an axis. If every second value is left out, the remaining values must still determine
+#: a curve.
 FEWEST = 4
 #: Error of interpolation with all values, divided by the error with every second value only. The ratio is 1/4 for an
-#: error of second order; at a kink it would be 1/2.
+#: error of second order, and 1/2 at a kink.
 LEFT = 0.25
 #: `LARGEST`: largest number of values in a dense table. `PIECES`: largest number of steps into which the interval
 #: between two computed values of an axis is divided.
@@ -27,10 +28,10 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale for some numbers; it is linear if any number is zero or negative.
+        """Return the scale for some numbers; the scale is linear if any number is zero or negative.
 
         With `spread`, the scale is logarithmic if the numbers span more than a decade. Without `spread`, the numbers
-        must ascend, and the scale is the one on which the numbers are more evenly spaced.
+        must ascend. The scale is then logarithmic if the logarithms are more evenly spaced than the numbers.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -50,7 +51,7 @@ class Scale:
 
 
 def dense(axes: Sequence[FloatArray], size: int) -> list[FloatArray]:
-    """Divide each interval between neighbouring values of an axis into equal steps; return given and new values.
+    """Divide each interval between neighbouring values of an axis into equal steps. Return given and new values.
 
     The steps are equal on the scale that `Scale.of` chooses for an axis. `size` is the number of values in the table of
     computed values.
@@ -70,7 +71,7 @@ def _divided(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis by monotone cubics; by default, the axis has the scale ``Scale.of(places)``."""
+    """Interpolate values along an axis by monotone cubics. If `scale` is None, ``Scale.of(places)`` is used."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -81,7 +82,7 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values linearly along an axis; by default, the axis has the scale ``Scale.of(places)``."""
+    """Interpolate values linearly along an axis. If `scale` is None, ``Scale.of(places)`` is used."""
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -91,7 +92,7 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Estimate the error of interpolation at every value of an axis (`places`) by leaving out every second value.
 
-    `table` contains numbers converted to `scale`; the result is the error of the numbers before this conversion. Each
+    `table` contains numbers converted to `scale`. The result is the error of the numbers before this conversion. Each
     error is the largest of three estimates: at the value itself and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)

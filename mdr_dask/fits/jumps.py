@@ -1,8 +1,8 @@
 """The size and the law of the jump of friction that a jump of the velocity causes (thesis eqs. 4.8 to 4.11).
 
 Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
-the jump and mu_2 long after it. The coefficient of friction changes by d_mu_0 at t_0, and then relaxes from mu(t_0+) =
-mu_1 + d_mu_0 to mu_2. The rms slope is s.
+the jump and mu_2 long after the jump. The coefficient of friction changes by d_mu_0 at t_0, and then relaxes from
+mu(t_0+) = mu_1 + d_mu_0 to mu_2. The rms slope is s.
 
 Eq. 4.11 is d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c = 0.4. For slow sliding (region
 I), eq. 4.11 becomes eq. 4.9, d_mu_0 / mu_1 = dv / v_1. On the plateau of friction, eq. 4.11 becomes eq. 4.10,

@@ -40,10 +40,11 @@ def master_curve(
     """Shift the curves of a table, or of a series of a store (means over realisations), onto one curve.
 
     For the arguments see ``mdr-dask master-curve --help``. ``shift_factor`` is added to log10 of the abscissa,
-    ``vertical_factor`` to log10 of the ordinate. The suffix ``_error`` marks the half width of the 68 % interval,
-    ``_low`` and ``_high`` the ends of the 95 % interval. If the curves differ in two parameters, such as v and T, they
-    are shifted by a(v) + b(T), and ``second_factor`` is b. If the reference lies between two groups, its factor is that
-    of the best law plus the interpolated difference between the shift factors and this law.
+    ``vertical_factor`` to log10 of the ordinate. The suffix ``_error`` marks the half width of the 68 % interval. The
+    suffixes ``_low`` and ``_high`` mark the ends of the 95 % interval. If the curves differ in two parameters, such as
+    v and T, the curves are shifted by a(v) + b(T), and ``second_factor`` is b. If the reference lies between two
+    groups, the factor at the reference is the factor of the best law plus the interpolated difference between the shift
+    factors and this law.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -79,7 +80,7 @@ def master_curve(
 
 
 def _largest_offset(found: Superposition, rise: FloatArray) -> str:
-    """Return a text with the largest vertical offset of a group, apart from the known `rise` and the median offset."""
+    """Return a text with the largest vertical offset of a group, after subtraction of `rise` and the median offset."""
     offset = rise - found.vertical
     offset -= np.median(offset)
     worst = int(np.argmax(np.abs(offset)))
@@ -146,7 +147,8 @@ def _of_two_groups(
 def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the nearest group if the reference lies just outside the groups.
 
-    Because measured values scatter, the reference may lie outside by up to a tenth of the mean step between groups.
+    Because measured values scatter, the reference may lie outside the groups by up to a tenth of the mean step between
+    groups.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:

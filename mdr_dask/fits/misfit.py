@@ -11,7 +11,7 @@ from scipy.special import chdtrc, fdtrc
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
 
-#: A trend of the residuals counts against the model if the probability that chance causes such a trend is below this.
+#: A trend of the residuals counts against the model if chance causes such a trend with a probability below this value.
 TREND = 0.005
 #: Least number of points whose residuals can show a trend.
 FEWEST = 6
@@ -20,10 +20,11 @@ FEWEST = 6
 class Residuals(NamedTuple):
     """Residuals of the best prediction.
 
-    A residual is a measured minus a predicted value. `scaled` contains the residuals over their standard deviations.
-    `relative` is the rms residual, and `errors` the rms standard deviation; both are divided by the rms measured value.
-    `chi_squared` takes the correlations of the errors into account; it is NaN if the measurement errors are unknown.
-    `freedom` is the number of points minus the number of unknowns and products of unknowns that the data determine.
+    A residual is a measured minus a predicted value. `scaled` contains the residuals divided by their standard
+    deviations. `relative` is the rms residual divided by the rms measured value. `errors` is the rms standard deviation
+    divided by the rms measured value. `chi_squared` takes the correlations of the errors into account. `chi_squared` is
+    NaN if the measurement errors are unknown. `freedom` is the number of points minus the number of unknowns and
+    products of unknowns that the data determine.
     """
 
     scaled: FloatArray

@@ -19,7 +19,8 @@ START = {1: 64, 2: 24, 3: 12, 4: 8}
 #: `BEST`: a refinement divides at least this number of cells; the keys are the numbers of unknowns. `MOST`: largest
 #: number of cells after a refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
-#: Cells are left out if ln(density) is below its maximum by more than this; their total probability is below 1e-5.
+#: Cells are left out if ln(density) is below its maximum by more than this value. The total probability of these cells
+#: is below 1e-5.
 REACH = 14.0
 #: Refinement ends when ln(density) varies within the divided cells by less than this value, on average over all cells
 #: weighted with their density.
@@ -50,8 +51,8 @@ class Noise(NamedTuple):
 def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) -> Callable[[FloatArray], FloatArray]:
     """Return a function that takes points in the unit cube and returns logarithms of the likelihood of measured values.
 
-    The points have the shape (sets, unknowns), the logarithms the shape (sets, number of sizes of all noises). All
-    items of `noises` have the same prior probability, and so have all sizes of one item.
+    The points have the shape (sets, unknowns). The logarithms have the shape (sets, total number of sizes in `noises`).
+    All items of `noises` have the same prior probability. All sizes of one item have the same prior probability.
     """
 
     def of(places: FloatArray) -> FloatArray:
@@ -69,10 +70,10 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return chi squared of the measured values and ln(determinant of their covariance), both of shape (sets,).
+    """Return chi squared and ln(determinant of the covariance) of the measured values, both of shape (sets,).
 
-    `noise` are the variances of the measurement errors. The covariance is a diagonal matrix plus a few terms for
-    errors common to all points; Woodbury's identity avoids the inversion of a large matrix.
+    `noise` contains the variances of the measurement errors. The covariance is a diagonal matrix plus a few terms for
+    errors common to all points. Woodbury's identity avoids the inversion of a large matrix.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -88,8 +89,8 @@ def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tup
 class Posterior(NamedTuple):
     """A posterior density on cells of the unit cube.
 
-    `places` are the centres of the cells, `weights` their probabilities, and `density` the logarithm of the density up
-    to a constant. `noise` is the probability of each size of the measurement error in each cell.
+    `places` are the centres of the cells, and `weights` are the probabilities of the cells. `density` is the logarithm
+    of the density up to a constant. `noise` is the probability of each size of the measurement error in each cell.
     """
 
     places: FloatArray
@@ -127,7 +128,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
     """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
 
-    If this would be more than `most` cells, `most` cells of high density are selected at random.
+    If these are more than `most` cells, `most` of these cells are selected at random.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

@@ -33,8 +33,8 @@ class Predicted(NamedTuple):
 
     `mean` is the mean over the realisations, shape (sets, points). `together`, shape (sets, points, modes), contains
     errors common to all points: each mode is the change of all points by one standard deviation. The last mode
-    represents the errors of grid and interpolation, the other modes the scatter of the rough lines. `alone` is the
-    variance of the errors that are independent for each point.
+    represents the errors of grid and interpolation. The other modes represent the scatter of the rough lines. `alone`
+    is the variance of the errors that are independent for each point.
     """
 
     mean: FloatArray
@@ -247,7 +247,7 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return the linear interpolation of the means in a dense table, and of the errors between computed values."""
+    """Return a prediction that interpolates linearly in a dense table of means and in the table of computed errors."""
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

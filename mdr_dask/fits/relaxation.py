@@ -1,11 +1,11 @@
 """Relaxation of friction after a jump of the velocity: one exponential, and laws of its rate (thesis eqs. 4.5 to 4.15).
 
-For the symbols v_1, v_2, dv, mu_1, mu_2, d_mu_0 and s see `mdr_dask.fits.jumps`; tau is the relaxation time of the
-body, t' = (t - t_0) / tau, and q_max the largest wave number of the roughness.
+For the symbols v_1, v_2, dv, mu_1, mu_2, d_mu_0 and s see `mdr_dask.fits.jumps`. The relaxation time of the body is
+tau, and t' is (t - t_0) / tau. The largest wave number of the roughness is q_max.
 
 By eqs. 4.13 to 4.15, mu - mu_2 begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by eq. 4.11, and is proportional to exp(-b
-t'). By eq. 4.12, the rate b is (v_1 tau q_max)^p with p = 1 below v_1 tau q_max = 1, and p = 1 - H above it; H is the
-Hurst exponent.
+t'). By eq. 4.12, the rate b is (v_1 tau q_max)^p. The power p is 1 if v_1 tau q_max < 1, and 1 - H if v_1 tau q_max >
+1, with the Hurst exponent H.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ FIELDS = {
 
 
 class Relaxation(NamedTuple):
-    """One exponential fitted to a trace, which is the mean of mu - mu_2 over realisations as a function of time.
+    """One exponential fitted to a trace. A trace is the mean of mu - mu_2 over realisations as a function of time.
 
     `rate` is the stack of the fitted rate, and `integral_rate` the stack of the rate that follows from the integral of
     the trace. `holds` is the verdict on the exponential.
@@ -145,7 +145,7 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
-    """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax."""
+    """Fit one exponential to a case; return None for too few realisations, or if friction does not relax."""
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
     relaxing = np.column_stack([before + jump - after, values[:, 3:] - after[:, None]])
@@ -249,7 +249,7 @@ def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
 def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
     """Fit a power law to rates on one side of v_1 tau q_max = 1; `x` is ln(v_1 tau q_max).
 
-    `rates` is a stack, `error` the standard errors of ln(rate), and `stated` the exponent by eq. 4.12.
+    `rates` is a stack. `error` contains the standard errors of ln(rate). `stated` is the exponent by eq. 4.12.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"

@@ -97,8 +97,8 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
     `fraction` is the length in contact divided by the length of the line. Only waves that are shorter than the length
-    in contact count; if there are no such waves, the result is NaN. The line has `points` points, and the shortest wave
-    is as long as two spacings of the points.
+    in contact count. If no wave is shorter, the result is NaN. The line has `points` points, and the shortest wave is
+    as long as two spacings of the points.
     """
     power = 2 * (1 - hurst)
     # wave numbers of the longest and the shortest wave, 2 pi / L_cont and q_max, both divided by 2 pi / L
@@ -182,7 +182,7 @@ def collapse(
 ) -> Collapse:
     """Shift curves of ln(friction) against ln(velocity) onto a common natural cubic spline by least squares.
 
-    The shifts are fitted to the first of the stacked `rows`; the shifts for the other rows follow by linearisation.
+    The shifts are fitted to the first of the stacked `rows`. The shifts for the remaining rows follow by linearisation.
     `curve` contains, for each point, the index of its curve. If `vertical` is false, curves are shifted along
     ln(velocity) only.
     """

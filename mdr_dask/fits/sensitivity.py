@@ -27,14 +27,14 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of a sampled study, with 95 % intervals.
 
     For Saltelli's design, first-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total
-    indices Jansen (1999). Any other design gives first-order indices only: the cases are sorted by an input, and the
+    indices Jansen (1999). Any other design gives first-order indices only. The cases are sorted by an input, and the
     outputs of neighbouring cases are multiplied (Gamboa et al., Bernoulli 28, 2345 (2022), here with several
     neighbours).
 
     The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
     wide, because points of a Sobol sequence fill space more evenly than random points. In Saltelli's design, an index
-    is computed from the base points for which all required cases succeeded; in other designs, from all cases that
-    succeeded.
+    is computed from the base points for which all required cases succeeded. In other designs, an index is computed from
+    all cases that succeeded.
     """
     inputs = _inputs(dataset)
     values, left_out = _values(dataset, output)
@@ -98,7 +98,7 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 
 
 def _is_saltelli(columns: FloatArray) -> bool:
-    """Return whether the cases are those of Saltelli's design.
+    """Return whether the cases form Saltelli's design.
 
     Each group of cases in this design consists of a point a, a point b and, for each input, a copy of point a in which
     this input has the value from point b.
@@ -136,7 +136,7 @@ def _exchanged(values: FloatArray) -> FloatArray:
 
 
 def _of_neighbours(values: FloatArray) -> FloatArray:
-    """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
+    """Return the first-order and the total index with the ends of the intervals, shape (3, 2). The total index is NaN.
 
     The first-order index is the mean of an estimate for random points and an estimate for points that fill space
     evenly, such as a Sobol sequence. The interval extends from the lower end for random points to the upper end for
@@ -148,7 +148,7 @@ def _of_neighbours(values: FloatArray) -> FloatArray:
 
 
 def _neighbours(values: FloatArray) -> FloatArray:
-    """Return the estimates of `_of_neighbours`; only the second one uses the product of each point with itself."""
+    """Return two estimates of the first-order index; only the second one uses the product of each point with itself."""
     most = max(1, int(np.sqrt(values.shape[1]) / 2))
     own, square = _product(values, values).mean(), values.mean() ** 2
     near = np.mean([_product(values[:, k:], values[:, :-k]).mean() for k in range(1, most + 1)])

@@ -10,8 +10,8 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most one of these fractions: the first fraction
-#: for which scatter and errors explain the residuals.
+#: A parabola is fitted to the points that are below the maximum by at most a fraction of the maximum. The first
+#: fraction in `TOPS` for which scatter and errors explain the residuals is used, or the last fraction if there is none.
 TOPS = (0.3, 0.2, 0.1, 0.05)
 
 
@@ -26,9 +26,9 @@ def smoothed(mean: FloatArray) -> FloatArray:
 class Top(NamedTuple):
     """The maximum of a parabola fitted to the points near the largest friction; every field is a stack.
 
-    `height` is the maximum, corrected for its bias; its interval includes the residuals of the parabola. `place` is
-    ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum; it is 0 unless the maximum is
-    at an end of the fitted range.
+    `height` is the maximum, corrected for the bias of the maximum. The interval of `height` includes the residuals of
+    the parabola. `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum.
+    `rise` is 0 unless the maximum is at an end of the fitted range.
     """
 
     height: FloatArray
@@ -48,8 +48,8 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    # a parabola through three points has no residuals; the error of its maximum is then the distance from the highest
-    # of these points
+    # a parabola through three points has no residuals; the error of the maximum of the parabola is then its distance
+    # from the highest of these points
     else:
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
@@ -68,7 +68,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Fit a parabola to every row. Return the maximum, its position, the relative slope there, and the residuals."""
+    """Fit a parabola to every row; return maximum, position of the maximum, relative slope there, and residuals."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])

@@ -5,10 +5,10 @@ The unknowns are the spline coefficients m_c of each channel c, followed by the 
     [ A_c   B_c ]
     [ B_c^T  D  ],
 
-where A_c is banded (half bandwidth 3); the blocks between two different channels are zero. Its Cholesky factor consists
-of the banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and the factor of the corner S = D - sum_c W_c^T W_c.
-Lower and symmetric matrices are stored by diagonals: ``band[i, d]`` is M[i, i - d]. There is one such matrix for each
-row of parameters (shifts and scales).
+where A_c is banded (half bandwidth 3). The blocks between two channels are zero. The Cholesky factor of the precision
+matrix consists of the banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and the factor of the corner S = D -
+sum_c W_c^T W_c. Lower and symmetric matrices are stored by diagonals: ``band[i, d]`` is M[i, i - d]. There is one
+precision matrix for each row of parameters (shifts and scales).
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Linear(NamedTuple):
     """Means and covariances of the unknowns for each row of parameters.
 
     `mean` contains the spline coefficients, channel by channel, then the offsets. `fitted` is the mean of the curve
-    minus the mean of the offset at each point, and `slope` the mean slope of the curve per cell of the spline.
-    `variance` is the variance of `fitted`, and `tilt` the covariance of `fitted` and `slope`. `rough` is the mean
+    minus the mean of the offset at each point, and `slope` is the mean slope of the curve per cell of the spline.
+    `variance` is the variance of `fitted`, and `tilt` is the covariance of `fitted` and `slope`. `rough` is the mean
     square of each second difference of the coefficients. `offsets` is the covariance of the offsets.
     """
 
@@ -69,9 +69,9 @@ def solve_rows(
     """Return the Cholesky factors of the precision matrix, and the means and covariances of the unknowns.
 
     At each point, `first` is the index of the first of the four splines that overlap there; `value` and `slope` are the
-    values and derivatives of these four. `member` is the index of the offset of each point. `weight` is the precision
-    of the ordinates y. `stiffness` and `tied` are the prior precisions of the second differences and of the offsets;
-    without offsets, `tied` has the shape (rows, 0, 0).
+    values and derivatives of these four splines. `member` is the index of the offset of each point. `weight` is the
+    precision of the ordinates y. `stiffness` is the prior precision of the second differences, and `tied` is the prior
+    precision of the offsets. Without offsets, `tied` has the shape (rows, 0, 0).
     """
     (rows, points), (channels, splines), offsets = first.shape, stiffness.shape[1:], tied.shape[1]
     splines += 2
@@ -294,7 +294,7 @@ def _back_substitute(band: FloatArray, border: FloatArray, corner: FloatArray, r
 
 @jit
 def _cholesky(band: FloatArray) -> float:
-    """Replace a symmetric matrix by its lower factor, and return the log determinant of the matrix.
+    """Replace a symmetric matrix by its lower Cholesky factor, and return the log determinant of the matrix.
 
     A pivot that is not positive because of rounding is replaced by the rounding error of the diagonal.
     """

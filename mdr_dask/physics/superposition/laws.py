@@ -27,9 +27,9 @@ class ShiftLaw:
 
     `name` is ``power``, ``arrhenius`` or ``wlf``. `constants` contains the value and the ends of the 95 % interval of
     ``exponent``, of ``activation_energy`` (J/mol), or of ``c1`` and ``c2`` (K) at the reference temperature. `factors`
-    returns the factors by the law in decades; they are zero at the anchor, the group whose measured factor is zero by
-    definition. `departures` are the measured factors minus those of the law, in decades. `chance` is the probability
-    that the errors of the factors would cause deviations at least as large if the law were exact.
+    returns the factors by the law in decades. These factors are zero at the anchor, the group whose measured factor is
+    zero by definition. `departures` are the measured factors minus the factors by the law, in decades. `chance` is the
+    probability that the errors of the factors would cause deviations at least as large if the law were exact.
     """
 
     name: str
@@ -68,8 +68,9 @@ def fit_wlf(
 ) -> ShiftLaw:
     """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)`` to temperatures in K.
 
-    First c1 / c2 and 1 / c2 are fitted with the anchor as reference; they remain finite if the factors are linear in
-    temperature. If the reference is dT above the anchor, c1 and c2 become ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
+    First c1 / c2 and 1 / c2 are fitted with the anchor as reference, because these ratios remain finite if the factors
+    are linear in temperature. If the reference is dT above the anchor, c1 and c2 become ``c2' = c2 + dT`` and ``c1' =
+    c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
     straight = STRAIGHTEST / float(np.ptp(temperature))
@@ -137,7 +138,7 @@ def _fit(
 
     Return the law, in which `constants` is still empty; the values of the constants and their covariance; and the half
     width of an interval divided by the standard error. If deviations from the law exceed the errors of the factors, an
-    additional scatter is fitted, whose square is added to the variances of the factors.
+    additional scatter is fitted. The square of this scatter is added to the variances of the factors.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size

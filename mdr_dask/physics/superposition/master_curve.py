@@ -61,10 +61,10 @@ class Superposition:
     curve_y, curve_error : array, shape (channels, curve points)
         The merged curves and their standard errors, at the reference.
     curve_cross : array, shape (channels, curve points, 2 groups)
-        Covariance of the curves and the factors.
+        Covariance of the merged curves and the factors.
     measured : tuple of float
-        Range of log10 x of the points measured at the reference. Outside this range the merged curve is determined by
-        shifted points, and so depends on the shift factors.
+        Range of log10 x of the points measured at the reference. Outside this range the merged curve depends on the
+        shift factors, because only shifted points determine the curve there.
     undetermined : tuple of (float, float)
         First and last group of each range in which the curves do not determine the shifts, for example on a plateau or
         across a gap.
@@ -136,12 +136,12 @@ def superpose(
         has the prior `OFFSET`. With 'free', the factors are unknown and change from curve to curve by steps with the
         prior `FREE`.
     reference : float, optional
-        Group, or value between two groups (see `rereference`), at which the factors are zero; by default the middle
+        Group, or value between two groups (see `rereference`), at which the factors are zero. None means the middle
         group.
     seed : int
         Seed of the draws.
     kelvin : array_like, shape (groups,), optional
-        Absolute temperatures of the groups, for b_T; by default the groups themselves.
+        Absolute temperatures of the groups, for b_T. None means that the groups are absolute temperatures.
 
     Raises
     ------

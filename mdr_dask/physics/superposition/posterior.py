@@ -4,10 +4,10 @@ Each channel c of a curve k (such as storage and loss modulus of one temperature
 
     y_c(x) = Q_c(x + h_k) - v_k + noise_c,
 
-with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline. The prior of its
-second differences is a normal distribution (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89), and so is the prior
-of the offsets. The density is integrated over spline coefficients and offsets in closed form; it depends only on the
-shifts and a few scale parameters.
+with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline. The prior of the
+second differences of its coefficients is a normal distribution (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89).
+The prior of the offsets is a normal distribution too. The density is integrated over spline coefficients and offsets in
+closed form. The result depends only on the shifts and a few scale parameters.
 """
 
 from __future__ import annotations
@@ -49,21 +49,22 @@ NOISE, NOISE_SCATTER = 0.01, 2.0
 """Prior of the relative scatter of each channel: median, and standard deviation of the logarithm of the scatter."""
 
 TREND = 10.0
-"""Prior standard deviation of the mean step of drifting offsets, divided by that of the steps about the mean step."""
+"""Ratio of two prior standard deviations of drifting offsets: of the mean step, and of steps about the mean step."""
 
 FARTHEST = 8.0
-"""Largest distance of the logarithm of a scale from its prior median; it prevents overflow."""
+"""Largest distance of the logarithm of a scale from its prior median. This limit prevents overflow."""
 
 
 @dataclass(frozen=True)
 class Curves:
     """Points of all curves; abscissae are divided by the median width of a curve, ordinates are in decades.
 
-    `member` is the index of the curve of each point, and `height` the median height of a curve in each channel.
+    `member` is the index of the curve of each point, and `height` is the median height of a curve in each channel.
     `splines` is the number of spline coefficients of each channel. `offset` describes the prior of the standard
     deviation s of the vertical offsets: the median of s in decades, and the standard deviation of ln s. Without
     offsets, `offset` is None. If `drifting` is True, the offsets change from curve to curve by steps. A step is a mean
-    step plus a scatter; the prior standard deviation of the mean step is `TREND` times that of the scatter.
+    step plus a scatter. The prior standard deviation of the mean step is `TREND` times the standard deviation of the
+    scatter.
     """
 
     x: FloatArray
@@ -130,7 +131,8 @@ class Solved:
     """For each row of parameters: the density, and the distribution of the spline coefficients and offsets.
 
     `energy` is the negative logarithm of the density, up to a constant. `mean` contains the mean coefficients of the
-    splines, channel by channel, then the offsets; `factors` are the Cholesky factors of their precision.
+    splines, channel by channel, then the offsets; `factors` are the Cholesky factors of the precision matrix of these
+    unknowns.
     """
 
     energy: FloatArray
@@ -146,7 +148,8 @@ class Solved:
 def solve(curves: Curves, rows: FloatArray) -> Solved:
     """Return density, gradient and spline coefficients for each row of parameters (see `Curves.prior`).
 
-    The gradient neglects that the knots of the splines move with the curves, which hardly changes the density.
+    The gradient neglects that the knots of the splines move with the curves, because this movement hardly changes the
+    density.
     """
     many, channels, points = rows.shape[0], curves.y.shape[0], curves.x.size
     count, splines, offsets = curves.count, curves.splines, 0 if curves.offset is None else curves.count
@@ -192,7 +195,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the first of the four splines at each position (in cells), and the values and slopes of all four."""
+    """Return the first of the four splines at each position (in cells), and values and slopes of all four splines."""
     # in a diverged row, positions may be NaN or infinite; such positions must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)

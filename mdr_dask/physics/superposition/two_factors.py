@@ -19,9 +19,9 @@ class TwoShifts:
     """Factors ``h(v, T) = a(v) + b(T)`` and the merged curve.
 
     `first` contains a, `second` contains b, and both contain the same merged curve. `chi_squared` is the reduced
-    chi-squared of the differences between the factor of each curve and the sum a + b; if `chi_squared` is above one,
+    chi-squared of the differences between the factor of each curve and the sum a + b. If `chi_squared` is above one,
     the errors of the factors are multiplied by the square root of `chi_squared`. `probability` is the probability of a
-    chi-squared at least as large if every factor is really a sum; it is 1 if no degree of freedom is left.
+    chi-squared at least as large if every factor is really a sum; `probability` is 1 if no degree of freedom is left.
     """
 
     first: Superposition
@@ -36,12 +36,12 @@ def superpose_twice(
     curves: Sequence[tuple[ArrayLike, ArrayLike]],
     reference: float | None = None,
 ) -> TwoShifts:
-    """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
+    """Shift curves that differ in two quantities into one curve, and split each shift factor into a sum a + b.
 
     First all curves are superposed with independent factors. Then a and b are fitted to the independent factors, with
     the inverse covariance as weight; to first order, this is the same as a direct fit to the curves. The factors are
     zero at the middle value of each quantity. If a `reference` is given, the factors of the first quantity are zero at
-    the value nearest to the reference instead.
+    the value nearest to the reference, and not at the middle value.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
@@ -70,7 +70,7 @@ def _split(
     design: FloatArray,
     columns: NDArray[np.intp],
 ) -> TwoShifts:
-    """Fit the sums a + b to the factors of all curves by least squares, weighted with their inverse covariance.
+    """Fit the sums a + b to the factors of all curves by least squares, weighted with the inverse covariance.
 
     `design` times the vector of all factors a and b gives the sums a + b of all curves. `columns` are the indices of
     the factors a and b that are not zero by definition.

@@ -1,7 +1,7 @@
-"""The line used by the solvers: cubic cells between equidistant nodes. A periodic line starts at its highest point.
+"""The line used by the solvers: cubic cells between equidistant nodes.
 
-The unit of length is the length of a cell; a slope is the rise over one cell. Heights may have any unit and are
-positive towards the elastomer.
+The unit of length is the length of a cell, and a slope is the rise over one cell. Heights may have any unit and are
+positive towards the elastomer. The function `cut` makes a periodic line start in the cell of its highest point.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
         Heights and slopes of the periodic roughness, as in :func:`periodic_line`.
     body : Shape
         The shape under the roughness, with its tip at node n // 2. The unit of length of the shape is the length of the
-        line. The unit of height is that of the roughness.
+        line. The unit of height is the unit of the roughness.
     """
     n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
@@ -77,7 +77,7 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
 
 
 def without_kinks(line: CubicLine) -> CubicLine:
-    """Replace the two slopes at every inner node by their mean; a kink is rounded over the two adjacent cells."""
+    """Replace the two slopes at every inner node by their mean, which rounds a kink over the two adjacent cells."""
     slope = 0.5 * (line.leave[:-1] + line.enter[1:])
     return line._replace(enter=np.append(line.enter[0], slope), leave=np.append(slope, line.leave[-1]))
 
@@ -86,9 +86,9 @@ class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
     A periodic line starts in the cell of its highest point. Heights are relative to the highest point, so that small
-    depths under light loads are not lost to rounding. `peak` is the largest height in each cell; `mean` and `stretch`
-    are the integrals of the height and of the squared slope over each cell. A period begins at the highest point:
-    `start` is the position of this point in cell 0, and `top` is its height.
+    depths under light loads are not lost to rounding. `peak` is the largest height in each cell. `mean` is the integral
+    of the height over each cell, and `stretch` is the integral of the squared slope. A period begins at the highest
+    point. The position of this point in cell 0 is `start`, and its height is `top`.
     """
 
     height: FloatArray
@@ -157,14 +157,14 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
     """Return the cell of the highest point of a periodic cubic line, and the position in the cell (0 to 1).
 
-    The slopes are those of a line of length 1.
+    The slopes apply to a line of length 1.
     """
     line = periodic_line(height, slope)
     return _highest(line.height, line.enter, line.leave)[:2]
 
 
 def cut(line: CubicLine) -> Cells:
-    """Split a line into its cells; a periodic line starts at its highest point."""
+    """Split a line into its cells. The first cell of a periodic line contains the highest point of the line."""
     best, place, top = _highest(line.height, line.enter, line.leave)
     if line.smooth and place == 1:  # if the highest point is a node, use the cell that begins there
         best, place = (best + 1) % line.enter.size, 0.0
@@ -228,8 +228,8 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
-    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The sum is
-    preserved by equal changes of the integrals of the other cells.
+    The integral over the first cell is not changed, because a period begins and ends inside this cell. The integrals
+    over the remaining cells are shifted by equal amounts, which preserves the sum over all cells.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

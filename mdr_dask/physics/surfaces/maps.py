@@ -17,11 +17,11 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 Order = Literal["none", "mean", "plane", "parabola"]
 
-MOST_MISSING = 0.05  # largest accepted fraction of missing points; missing points are filled
+MOST_MISSING = 0.05  # largest accepted fraction of missing points
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
-SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
+SIGNIFICANT = 1e-3  # rings with less than this fraction of the largest contribution may be due to rounding
 MOST_SCATTER = 0.02  # an octave is used if the mean square of an angular harmonic due to scatter alone is at most this
-BY_SCATTER = 4.0  # due to scatter, a squared harmonic exceeds this many times its mean in exp(-4) = 2 % of octaves
+BY_SCATTER = 4.0  # scatter makes a squared harmonic exceed this many times its mean with probability exp(-4) = 2 %
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 
 
@@ -54,7 +54,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     for down, right in np.ndindex(3, 3):
         beside = np.clip(row + down - 1, 0, away.shape[0] - 1), np.clip(column + right - 1, 0, away.shape[1] - 1)
         largest = np.fmax(largest, away[beside])
-    # a neighbour of an outlier is an outlier only if it deviates more than half as much as this outlier
+    # a neighbour of an outlier is an outlier only if its deviation is more than half the deviation of this outlier
     deviates = away[row, column] > 0.5 * largest
     found[row[deviates] + 1, column[deviates] + 1] = True
     return found
@@ -125,7 +125,7 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
     """Return the Hann window as a function of the distance from the centre.
 
-    The mean square of the window is 1; the window is 0 beyond half the shorter side of the map.
+    The mean square of the window is 1. Beyond half the shorter side of the map, the window is 0.
     """
     x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
@@ -142,13 +142,13 @@ class MapSpectrum:
     The width dq of a ring is 2 pi divided by the shorter side of the map. `density` is C2D, m^4: the power in a ring
     divided by the area of the ring, so that rms height and rms gradient are preserved. `count` is the number of waves
     in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves that are
-    statistically independent; it is less than 1 with a window. `rms_height`, m, is the rms height of the windowed map.
-    `slopes` contains the mean square of the slope along x, the mean square of the slope along y, and the mean product
-    of both slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by
-    power; they are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of straight profiles:
-    first along x, then along y. `axes` contains, for each axis, the power of the wave along this axis divided by the
-    mean power of the waves in the same ring. The ratio is a median over the rings, divided by ln(2): 1 for an isotropic
-    surface.
+    statistically independent: 1 without a window, less than 1 with a window. `rms_height`, m, is the rms height of the
+    windowed map. `slopes` contains the mean square of the slope along x, the mean square of the slope along y, and the
+    mean product of both slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring,
+    weighted by power. Both means are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of
+    straight profiles: first along x, then along y. `axes` contains, for each axis, the power of the wave along this
+    axis divided by the mean power of the waves in the same ring. The ratio is a median over the rings, divided by
+    ln(2): 1 for an isotropic surface.
     """
 
     wavenumber: FloatArray
@@ -212,7 +212,7 @@ class MapSpectrum:
 def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     """Return the spectrum of a map without missing points and without trend.
 
-    By default the window `hann_disc` is applied; a periodic map needs no window.
+    If `hann` is true, the map is multiplied by the window `hann_disc`. A periodic map needs no window.
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()

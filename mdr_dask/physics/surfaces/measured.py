@@ -43,7 +43,7 @@ def measured_line(
     """Turn positions and heights of a recorded line, m, into one period of a line with uniform spacing.
 
     The length of the period is the number of points times the mean spacing. At both ends, a cosine window reduces the
-    heights towards their mean; `taper` is the fraction of the line that the window changes: 0.1 means 5 % of the line
+    heights towards their mean. `taper` is the fraction of the line that the window changes: 0.1 means 5 % of the line
     at each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit.
     """
     x, z = _ordered(position, height)

@@ -31,15 +31,15 @@ class RoughLine:
         return self.roughness.heights(2 * self.points), self.roughness.slopes(2 * self.points)
 
     def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:
-        """Return the line of cubic cells through heights and slopes, or of straight cells if no slopes are given."""
+        """Return the line through heights and slopes; the cells are cubic, or straight if no slopes are given."""
         return periodic_line(height, slope) if self.body is None else indented_line(height, slope, self.body)
 
     def cubic(self, nodes: int) -> CubicLine:
-        """Return the line of cubic cells on a grid."""
+        """Return the line with `nodes` cubic cells."""
         return self.through(self.roughness.heights(nodes), self.roughness.slopes(nodes))
 
     def straight(self, nodes: int) -> CubicLine:
-        """Return the line of straight cells on a grid."""
+        """Return the line with `nodes` straight cells."""
         return self.through(self.roughness.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:

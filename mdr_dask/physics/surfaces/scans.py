@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
-NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q exceeds this; for roughness, it is -1 or less
+NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q exceeds this; roughness has -1 or less
 NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
@@ -62,8 +62,8 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
 def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
     """Average a spectrum in ten logarithmic bins per decade; the power in each bin is preserved.
 
-    `independent` is the number of statistically independent squared amplitudes per wave; it determines the standard
-    error. `count` is the number of waves at each wave number, 1 by default.
+    `independent` is the number of statistically independent squared amplitudes per wave, from which the standard error
+    follows. `count` is the number of waves at each wave number (1 if `count` is None).
     """
     count = np.ones(wavenumber.size) if count is None else count
     bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * 10).astype(int)
@@ -80,7 +80,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the bins before the first fall that is steeper than `STEEPEST`; such a fall is the end of the spectrum."""
+    """Return the bins before the first fall that is steeper than `STEEPEST`; the spectrum ends at this fall."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))

@@ -29,7 +29,7 @@ class Interval(NamedTuple):
 
 
 class SelfAffine(NamedTuple):
-    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; a wavelength is None if the data show no cut-off."""
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None for a wavelength at which there is no cut-off."""
 
     hurst: Interval
     longest: Interval | None
@@ -69,8 +69,9 @@ def steep_limit(bins: Cut) -> float:
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
     """Fit a power law to C2D; return None if the spectrum is not a power law or has too few bins.
 
-    Schwarz's information criterion decides whether there are cut-offs, and at which bins. The confidence intervals
-    follow from the likelihood; they are wider if the spectrum deviates from the law by more than its standard errors.
+    Schwarz's information criterion decides whether there are cut-offs, and at which bins the cut-offs lie. The
+    confidence intervals follow from the likelihood. If the spectrum deviates from the law by more than the standard
+    errors, the intervals are wider.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

@@ -140,8 +140,8 @@ def smooth(loads: FloatArray, deborah: FloatArray, coefficient: float, exponent:
     """Return the steady states of a smooth line c |x|^n, n >= 1, that slides towards -x over a Kelvin foundation.
 
     The loads are F_N / (4 G), and `deborah` is v tau. At the depth d the contact lies between -a and b, with d = c a^n
-    and d = c (b^n + n v tau b^(n-1)), or b = 0 if there is no such b. Newton's method converges, because the load is a
-    convex function of d with the derivative a + b + v tau.
+    and d = c (b^n + n v tau b^(n-1)). If no b satisfies the second equation, b is 0. Newton's method converges, because
+    the load is a convex function of d with the derivative a + b + v tau.
     """
     c, n = coefficient, exponent
     depth, active = c * half_width(loads, c, n) ** n, np.ones(loads.size, np.bool_)
@@ -162,8 +162,8 @@ def _trailing(drop: FloatArray, deborah: FloatArray, exponent: float) -> FloatAr
     """Return the positive solution b of b^n + n deborah b^(n-1) = drop, or 0 if there is none (possible for n = 1)."""
     if exponent == 1:
         return np.maximum(drop - deborah, 0.0)
-    # Newton's method for y = log b starts above the solution. It converges from above, because the logarithm of the
-    # left side is a convex, increasing function of y.
+    # Newton's method for y = log b starts above the solution. The method converges from above, because the logarithm of
+    # the left side is a convex, increasing function of y.
     goal = np.log(drop)
     y, active = goal / exponent, np.ones(drop.size, np.bool_)
     for _ in range(ITERATIONS):

@@ -113,7 +113,7 @@ class Spectrum:
         return math.sqrt(2 * np.pi * self._moment(3))
 
     def _moment(self, order: int) -> float:
-        """Return the integral of q^order C2D over q; it is exact, because C2D is a power law between points."""
+        """Return the integral of q^order C2D over q; the result is exact, because C2D is a power law between points."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
         # if v is linear, the integral of exp(v) is the width times the logarithmic mean of exp(v) at both ends

@@ -22,8 +22,8 @@ Piece = tuple[float, float, float, float]
 def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     """Return the coefficients of the least-squares spline of a sum of waves with at least two nodes per shortest wave.
 
-    `waves` contains half of the complex amplitude of every wave. Each amplitude is multiplied by the Fourier transform
-    of the B-spline, divided by the sum of the squares of this transform over all aliases of the wave (Unser,
+    `waves` contains half of the complex amplitude of every wave. Each amplitude is multiplied by a factor: the Fourier
+    transform of the B-spline, divided by the sum of the squares of this transform over all aliases of the wave (Unser,
     IEEE Signal Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
@@ -82,7 +82,7 @@ def shares(t: float) -> Piece:
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     """Append to `found` the positions, between k and k + 1, at which piece k changes sign; return the new count.
 
-    A piece changes sign at most three times. It does not change sign if all four coefficients have the same sign.
+    A piece changes sign at most three times. A piece does not change sign if all four coefficients have the same sign.
     """
     of = piece(spline, k)
     # the formula by which `piece` computes the first height of the next piece, so that adjacent pieces agree
@@ -136,6 +136,6 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: Newton's method ends with a step of at most `CLOSE`; the remaining error is about the square of the last step. Even
+#: Newton's method ends with a step of at most `CLOSE`. The remaining error is about the square of the last step. Even
 #: if every step halves the interval, `STEPS` steps are enough for the accuracy of the floating-point numbers.
 CLOSE, STEPS = 1e-7, 60
