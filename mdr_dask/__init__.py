@@ -1,6 +1,6 @@
 """A distributed parameter-study runner for tribology with the method of dimensionality reduction.
 
-The public names are imported from their modules when they are first used, so that importing the package is quick.
+A public name is imported from its module at the first use of the name. Importing the package is therefore quick.
 """
 
 from importlib import import_module

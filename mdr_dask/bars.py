@@ -121,7 +121,7 @@ def _write(line: str) -> None:
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
 
-    The remaining time counts down until the next block ends; it is not shown at zero.
+    The remaining time counts down until the next block ends. A remaining time of zero is not shown.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

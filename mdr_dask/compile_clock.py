@@ -1,4 +1,4 @@
-"""Measure the time that numba spends on compilation in this process."""
+"""The time that numba spends on compilation in this process."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class CompileClock:
-    """Seconds during which at least one thread was compiling."""
+    """A clock that runs while at least one thread compiles."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -22,7 +22,7 @@ class CompileClock:
             self._running += 1
 
     def end(self) -> None:
-        """Register the end of a compilation, unless it started before the clock existed."""
+        """Register the end of a compilation, unless the compilation started before the clock existed."""
         with self._lock:
             if self._running == 1:
                 self._before += time.perf_counter() - self._since
@@ -42,7 +42,7 @@ class CompileClock:
 
 @lru_cache(maxsize=1)
 def compile_clock() -> CompileClock:
-    """Return the clock of this process; it starts at the first call."""
+    """Return the clock of this process. The first call creates the clock."""
     from numba.core.event import Event, Listener, register
 
     clock = CompileClock()

@@ -20,22 +20,23 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations of a block of a large study, which takes about a second to compute, and only milliseconds to
-#: schedule and write.
+#: Number of operations of a block of a large study. Such a block takes about a second to compute, and only milliseconds
+#: to schedule and write.
 OPERATIONS = 1e9
-#: A small study is cut into about `FEW_BLOCKS` blocks for several workers, each with at least `LEAST` operations.
+#: A small study is cut into about `FEW_BLOCKS` blocks for several workers. A block has at least `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share work are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
-#: Blocks below `MOST_SHARED` are halved only if the total number of operations then grows by less than this factor.
+#: Blocks with fewer operations than `MOST_SHARED` are halved only if the halving multiplies the total number of
+#: operations by less than this factor.
 REPEATED_WORK = 1.15
 #: Largest number of blocks of a series whose operations are counted, so that `check` is fast.
 SAMPLED = 1000
-#: Largest number of records in one file, which then has about a megabyte.
+#: Largest number of records in one file. A file with this number of records has about a megabyte.
 RECORDS_TOGETHER = 1000
-#: Largest size of a chunk in bytes; a task needs memory for one chunk of each output.
+#: Largest size of a chunk in bytes. A task needs memory for one chunk of each output.
 CHUNK_BYTES = 64 * 2**20
-#: Largest number of results of a series; a larger number is taken to be a mistake in the campaign file.
+#: Largest number of results of a series. A larger number is taken to be a mistake in the campaign file.
 MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
@@ -81,7 +82,7 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes on some values of every axis of the series, or on its parameters if it has no axis."""
+        """Notes on some values of every axis. If the series has no axis, notes on the parameters."""
         base = self.series.parameters
         sets = [with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some] or [base]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -116,11 +117,11 @@ class Template:
         )
 
     def block(self, index: BlockIndex) -> Block[Any]:
-        """Return a block to compute, with its cases in C order of their dimensions."""
+        """Return a block to compute. The cases of the block are in C order of the dimensions."""
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the approximate number of operations of a block, counted for its cases and the first realisations."""
+        """Return the approximate operations of a block, counted for the same cases in the first realisations."""
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
         first, known = (*cases, 0), self._known
@@ -129,7 +130,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the number of operations of a block. If it is unknown, assume that N results need sqrt(N) blocks."""
+        """Return the number of operations of a block. Without a count, assume that N results need sqrt(N) blocks."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)
@@ -195,7 +196,8 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 class Estimate:
     """The costs of the first round of a campaign, as ``run --dry-run`` prints them.
 
-    `operations` is None if the model does not count them. Adaptive axes can multiply the number of cases by `growth`.
+    `operations` is None if the model does not count operations. `growth` is the factor by which adaptive axes can
+    increase the number of cases.
     """
 
     cases: int
@@ -224,7 +226,8 @@ class Estimate:
 def templates(
     campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
 ) -> tuple[Template, ...]:
-    """Lay out every series of a campaign; raise CampaignError if it has too many results or needs too much memory.
+    """Lay out every series of a campaign; raise CampaignError if a series has too many results or needs too much
+    memory.
 
     `stored_chunks` contains the chunk lengths of the series that are already in the store.
     """
@@ -278,7 +281,7 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
 
 
 def available_memory() -> float:
-    """Return the memory of this machine, or of its control group if that has less, in bytes."""
+    """Return the memory of this machine in bytes, or the limit of the control group if the limit is lower."""
     import psutil
 
     limits = [psutil.virtual_memory().total]
@@ -291,7 +294,7 @@ def available_memory() -> float:
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the length of a block along each dimension.
 
-    A block first gets all values of the axes along which cases share work; a block that is too large is halved along
+    A block first gets all values of the axes along which cases share work. A block that is too large is halved along
     these axes. A block with few operations gets more realisations, then more values of other axes, and finally the
     realisations of later rounds.
     """
@@ -325,7 +328,7 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
     """Return whether to halve blocks along `dim`, a dimension along which cases share work.
 
-    Blocks of at most `most` operations are not halved; other blocks are halved according to `MOST_SHARED` and
+    Blocks of at most `most` operations are not halved. Larger blocks are halved according to `MOST_SHARED` and
     `REPEATED_WORK`.
     """
     now = template.mean_operations(chunks)
@@ -378,7 +381,7 @@ def _growth(series: Series) -> float:
 
 
 def _operations_and_solves(template: Template, model: Model[Any]) -> tuple[float, int]:
-    """Estimate the numbers of operations and solutions of a series from some of its blocks."""
+    """Estimate the number of operations and the number of solutions of a series from some blocks of the series."""
     lengths, realisations = template.grid[:-1], template.sizes["realisation"]
     blocks = math.prod(lengths)
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)

@@ -61,17 +61,14 @@ def read(source: Source) -> Campaign:
 
 
 def check(source: Source) -> Summary:
-    """Check a campaign, and summarise what it will compute and cost.
+    """Check a campaign, and summarise the results and the costs of the campaign.
 
     Returns
     -------
     Summary
         Number of cases and results, size and computing time. ``print`` shows the lines of ``mdr-dask check``.
 
-    Raises
-    ------
-    CampaignError
-        If the campaign has problems. The error lists all of them.
+    Raises ------ CampaignError If the campaign has problems. The error message lists all problems.
 
     Examples
     --------
@@ -92,21 +89,14 @@ def run(
 ) -> xr.Dataset | xr.DataTree:
     """Compute the results of a campaign that are missing, and return the study.
 
-    After an interruption, run it again: finished results are kept.
+    After an interruption, call `run` again. Finished results are kept.
 
-    Parameters
-    ----------
-    source : mapping, str, Path or Campaign
-        The campaign, in any form that `read` accepts.
-    store : str or Path, optional
-        Path or URL of the store. The default is the store that the campaign names. If it names no store, results are
-        stored in a temporary folder that is kept until the process ends.
-    progress : bool
-        Whether to show the progress: as a bar in a notebook or on a terminal, otherwise as a line every few seconds.
-    resources : Resources, optional
-        Threads, processes, a scheduler or a cluster; the default is all cores of this machine.
-    retry_failed : bool
-        Whether to compute failed and not converged cases again.
+    Parameters ---------- source : mapping, str, Path or Campaign The campaign, in any form that `read` accepts. store :
+    str or Path, optional Path or URL of the store. The default is the store that the campaign names. If the campaign
+    names no store, results are stored in a temporary folder that is kept until the process ends. progress : bool
+    Whether to show the progress: as a bar in a notebook or on a terminal, otherwise as a line every few seconds.
+    resources : Resources, optional Threads, processes, a scheduler or a cluster; the default is all cores of this
+    machine. retry_failed : bool Whether to compute failed and not converged cases again.
 
     Returns
     -------
@@ -114,10 +104,7 @@ def run(
         The study, as returned by `open_study`. Failed results, and questions about numbers without a unit, are shown as
         warnings.
 
-    Raises
-    ------
-    MdrDaskError
-        If the campaign cannot be run. The message is that of ``mdr-dask run``.
+    Raises ------ MdrDaskError If the campaign cannot be run. The message is the message of ``mdr-dask run``.
 
     Examples
     --------
@@ -141,12 +128,10 @@ def run(
 def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     """Open a study, finished or not.
 
-    Returns
-    -------
-    Dataset or DataTree
-        The outputs, with their units and errors, and ``status``; their dimensions are the axes and ``realisation``. A
-        campaign with series gives a DataTree with a node for each series. An array is read when it is first used. The
-        attribute ``complete`` is False as long as results are missing. Means are then taken over the available results.
+    Returns ------- Dataset or DataTree The outputs, with units and errors, and ``status``. The dimensions of these
+    arrays are the axes and ``realisation``. A campaign with series gives a DataTree with a node for each series. An
+    array is read when it is first used. The attribute ``complete`` is False as long as results are missing. Means are
+    then taken over the available results.
 
     Raises
     ------
@@ -246,11 +231,8 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
         Table of measured points, used instead of the table of the campaign. Units are in brackets after the column
         names.
 
-    Returns
-    -------
-    Dataset or DataTree
-        The constants, the ends of their intervals (with ``_low`` and ``_high`` after the name), and ``law_holds``. If
-        series are fitted separately, the result is a DataTree with a node for each series.
+    Returns ------- Dataset or DataTree The constants, the limits of the intervals (with ``_low`` and ``_high`` after
+    the name), and ``law_holds``. If series are fitted separately, the result is a DataTree with a node for each series.
 
     Raises
     ------
@@ -349,10 +331,8 @@ def master_curve(
     over, of, by, vertical, reference
         As the options of the command.
 
-    Returns
-    -------
-    Dataset
-        The shift factors, the merged curve with its error, and the constants of the laws that the factors follow.
+    Returns ------- Dataset The shift factors, the merged curve with the error of the curve, and the constants of the
+    laws for the factors.
     """
     from pandas import DataFrame
 
@@ -375,7 +355,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases; a number is left out if the study lacks a quantity of its formula."""
+        """The dimensionless numbers of the cases. A number is left out if the study lacks a quantity in the formula."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})
@@ -411,7 +391,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign; a temporary store is named by a digest of campaign and model."""
+    """Return the path of the store of a campaign. A temporary store is named by a digest of campaign and model."""
     if not is_temporary:
         return found.store
     made_by = f"{models.load(found.model).version} {models.source_digest(found.model)}"

@@ -14,15 +14,15 @@ from mdr_dask.models.base import unit_of
 from mdr_dask.plan import Estimate, estimate
 from mdr_dask.units import seconds, shown
 
-#: Longest list of values that is printed in full.
+#: Largest number of values of an axis that are all printed.
 LISTED = 6
 
 
 @dataclass(frozen=True, repr=False)
 class Summary(Estimate):
-    """The results and the costs of a campaign; ``print`` shows the text of ``mdr-dask check``.
+    """The results and the costs of a campaign. ``print`` shows the text of ``mdr-dask check``.
 
-    `lines` are the axes of each series, notes, and costs; `questions` are about numbers without a unit.
+    `lines` are the axes of each series, notes, and costs. `questions` are questions about numbers without a unit.
     """
 
     lines: tuple[str, ...] = ()
@@ -67,9 +67,9 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
 
 
 def _defaults(campaign: Campaign) -> list[str]:
-    """Return names and values of defaults that are not zero, false or empty and have an effect.
+    """Return names and values of parameters not given, if the default has an effect and is not zero, false or empty.
 
-    If only some series use a default, the names of these series follow in brackets.
+    If only some series use a default value, the names of these series follow in brackets.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:
@@ -93,7 +93,7 @@ def _defaults(campaign: Campaign) -> list[str]:
 
 
 def axis_range(axis: Axis, unit: str, written: str = "") -> str:
-    """Return the values of an axis, or their range and number: ``1 mN to 100 N, 20 values, geometric``."""
+    """Return the values of an axis, or the range and number of the values: ``1 mN to 100 N, 20 values, geometric``."""
     count = len(axis.values)
     if axis.refinement is not None:
         low, high = (shown(value, unit, written=written) for value in (axis.values[0], axis.values[-1]))
@@ -119,7 +119,7 @@ def _adaptive(refinement: Refinement, first: int) -> str:
 
 
 def spacing(values: tuple[float, ...]) -> str:
-    """Return ``, linear`` for values at equal distances, ``, geometric`` for equal ratios, or else an empty text."""
+    """Return ``, linear`` for equal differences of the values, ``, geometric`` for equal ratios, or an empty text."""
     import numpy as np
 
     numbers = np.asarray(values, dtype=np.float64)

@@ -35,7 +35,7 @@ class Work:
     # Versions of the program and of the model in the process that started the run.
     versions: tuple[str, int]
     block: Block[Any]
-    # Masks with the shape of the block: results to compute, and results to mark as not needed.
+    # Masks with the shape of the block. `wanted`: results to compute. `spared`: results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
     # Number of times that the computation of the block has been started, including this time.
@@ -43,7 +43,7 @@ class Work:
     operations: float
 
     def halves(self) -> tuple[Work, ...]:
-        """Return two tasks with half of the results each, or no tasks if there is only one result."""
+        """Return two tasks, each with half of the results, or no tasks if there is only one result."""
         cells = np.flatnonzero(self.wanted)
         if cells.size < 2:
             return ()
@@ -113,14 +113,14 @@ def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
     return tuple(np.bincount(status[work.wanted | work.spared], minlength=len(Status)).tolist())
 
 
-#: Errors from a fault of the machine, such as a full disk or a missing library, and not from a case.
+#: Errors that a fault of the machine may cause, such as a full disk or a missing library.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Largest number of characters of a stored message; every failed result has a message.
+#: Largest number of characters of a stored message. Every failed result has a message.
 LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model for a block; if that raises an exception, call it for each result, to find out which fail.
+    """Call the model for a block. If the call raises an exception, call the model for every single result.
 
     If the user wrote the model (`is_own`), every exception counts as a failed case, and the results are checked.
     """
@@ -274,7 +274,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
 
 
 def _place(work: Work, case: int, number: int) -> list[int]:
-    """Return the indices in the ledger of a result, from the numbers of its case and realisation in the block."""
+    """Return the position of a result in the ledger, from the indices of case and realisation in the block."""
     region = work.place.region
     shape = [part.stop - part.start for part in region]
     inside = [int(offset) for offset in np.unravel_index(case, shape[:-1])] if len(shape) > 1 else []
@@ -288,7 +288,7 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return the names of the processor and the numerical libraries, on which the last digits of results may depend."""
+    """Return the names of the processor and the libraries. The last digits of results may depend on these names."""
     if KIND in os.environ:
         return os.environ[KIND]
     from importlib.metadata import version
@@ -313,7 +313,7 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Mark the results of a task as failed without computing them."""
+    """Mark the results that a task should compute as failed, without computing these results."""
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED

@@ -17,17 +17,18 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
 
-#: Least number of realisations for the interval of a fitted constant: with fewer, the bootstrap underestimates scatter.
+#: Least number of realisations for the interval of a fitted constant. With fewer realisations, the bootstrap
+#: underestimates the scatter.
 FEWEST = 10
 
 
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations, because they affect a constant whose interval is too wide.
+    """Return the cases that need more realisations: all cases that affect a constant with too wide an interval.
 
-    `places` are the positions of the cases of the stage in the store, and `taken` is the number of realisations of each
-    case from which the constants are computed.
+    `places` are the positions that the values of the stage have in the store. `taken` is, for each case, the number of
+    realisations from which the constants are computed.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:  # no interval can be computed yet
@@ -76,11 +77,11 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the results of every series, with NaN for failed realisations and for realisations beyond `taken`."""
+    """Return the results of every series, with NaN for realisations beyond `taken` and for results not done."""
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # the root may have another name in the store
+        data = opened[name if name in opened else next(iter(opened))]  # the store may name this series otherwise
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}
@@ -97,6 +98,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return a mask of cases in the order that the dimensions and values have in the series."""
+    """Return a mask of cases as an array, with dimensions and values in the order of the series."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

@@ -22,10 +22,11 @@ class Cells:
     """The results of one group that a round computes or marks as not needed."""
 
     template: Template
-    # Masks with the shape of the group: results to compute, and results to mark as not needed.
+    # Masks with the shape of the group. `wanted`: results to compute. `spared`: results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
-    # Number of results of the round in the store, and number of failed results among them.
+    # `kept`: number of results of the round that stay as they are in the store. `failed`: number of failed and not
+    # converged results among these results.
     kept: int
     failed: int
 
@@ -51,8 +52,9 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger to find the results that the round still has to compute.
 
-    `asked` marks the cases of the stage, and `needed` the cases that need the realisations of the round: those from
-    ``realisations[0]`` to ``realisations[1] - 1``. `own` marks the results of this part of the campaign (None: all).
+    `asked` marks the cases of the stage. `needed` marks the cases that need the realisations of the round. These
+    realisations are ``realisations[0]`` to ``realisations[1] - 1``. `own` marks the results that belong to this part of
+    the campaign; None means all results.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -71,7 +73,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """For each group, yield an array with the part (1 to `count`) that computes each result."""
+    """Yield an array for each group. The array holds the part (1 to `count`) that computes each result."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)

@@ -1,7 +1,8 @@
-"""Compute blocks in child processes of this machine, because a block may crash its process or take too long.
+"""Child processes of this machine that compute blocks. A block that crashes or takes too long does not end the run.
 
-A server process imports all modules and forks the children. A child reads blocks from its pipe and writes the outcomes
-to this pipe. If a child dies, the server reports this through the pipe and forks a new child for the pipe.
+A server process imports all modules and forks the children. Each child has a pipe. The child reads blocks from the pipe
+and writes the outcomes to the pipe. If a child dies, the server reports the death through the pipe of the child and
+forks a new child for the same pipe.
 """
 
 from __future__ import annotations
@@ -32,10 +33,11 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
 #: Environment variables that limit libraries for linear algebra to one thread if they are set before the import.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: A process is killed this time in s after the sum of the time limits of its results. A case in plain Python normally
-#: raises TimeoutError at its limit.
+#: A child process is killed if a block takes this time in s longer than the sum of the time limits of its results. A
+#: case in plain Python normally raises TimeoutError before, at the time limit of the case.
 GRACE = 1.0
-#: After this number of crashes, the other realisations of the case are marked as failed without computing them.
+#: If this number of realisations of a case have crashed, the other realisations of the case are marked as failed and
+#: are not computed.
 MOST_CRASHES = 2
 
 
@@ -48,7 +50,7 @@ class Crash:
 
 @dataclass(frozen=True)
 class Child:
-    """The pipe to a child process, which computes one block at a time, and the server that has started the child."""
+    """The pipe to a child process, and the server that has started the child. A child computes one block at a time."""
 
     pipe: Connection
     server: subprocess.Popen[bytes]
@@ -79,7 +81,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model; at the end wait for their blocks, or kill them after an exception."""
+    """Start child processes for a model. At the end wait until the children end; after an exception kill them."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     path = os.pathsep.join(str(Path(folder).absolute()) for folder in sys.path)
@@ -102,8 +104,8 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
     """Compute a block that may crash its process.
 
-    If the process crashes, each half of the block is computed alone, and so on down to single results. A single result
-    that crashes its process is marked as failed.
+    If the process crashes, each half of the block is computed alone. If a half crashes the process, this half is halved
+    again, down to single results. A single result that crashes the process is marked as failed.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()

@@ -1,4 +1,4 @@
-"""Start a Dask cluster, or connect to a running one."""
+"""Start a Dask cluster, or connect to a running cluster."""
 
 from __future__ import annotations
 
@@ -24,18 +24,20 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Time in s to wait for the first answer of a scheduler, which must import its modules before it can answer.
+#: Time in s to wait for the first answer of a scheduler. A scheduler must import modules before the first answer.
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
 #: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time.
 TARGET_DURATION = "1s"
-#: Loggers whose messages explain why workers cannot be started. Messages of the run quote the last of these messages.
+#: Loggers whose messages explain why workers cannot be started. Messages of the run quote the newest message of these
+#: loggers.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
 #: Loggers whose messages are discarded, because they repeat errors that the run reports.
 ECHOES = ("distributed", "asyncio")
-#: Settings of a cluster on this machine. If a worker dies, Dask reports its block to the run and does not try the block
-#: again; the supervising process (the nanny) restarts the worker. Profiling would take 4 % of a core for each worker.
+#: Settings of a cluster on this machine. If a worker dies, Dask reports the block of this worker to the run and does
+#: not try the block again. The supervising process (the nanny) restarts the worker. Profiling would take 4 % of a core
+#: for each worker.
 ON_THIS_MACHINE = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.scheduler.allowed-failures": 0,
@@ -57,7 +59,7 @@ class _LastMessage(logging.Handler):
 
 @contextmanager
 def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
-    """Start a cluster or connect to a running one, and yield a task window on its workers."""
+    """Start a cluster or connect to a running cluster, and yield a task window on the workers of the cluster."""
     message = _LastMessage(logging.ERROR)
     with ExitStack() as stack:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
@@ -88,7 +90,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
 
 
 def _require_guard() -> None:
-    """Raise ClusterError if a script lacks ``if __name__ == "__main__"``, because worker processes import it."""
+    """Raise ClusterError if the script, which worker processes import, lacks ``if __name__ == "__main__"``."""
     main = sys.modules.get("__main__")
     source = getattr(main, "__file__", None)
     frame = sys._getframe()
@@ -102,7 +104,7 @@ def _require_guard() -> None:
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them, because Dask adds handlers to all of them."""
+    """Return the named loggers and all loggers below the named loggers. Dask adds handlers to all these loggers."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 
@@ -147,7 +149,7 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
 
 
 def cluster_class(name: str) -> type[Cluster]:
-    """Return the class of Dask clusters with a dotted name; raise ClusterError if there is none."""
+    """Return the class of Dask clusters with a dotted name; raise ClusterError if there is no such class."""
     package, _, attribute = name.rpartition(".")
     try:
         found = getattr(import_module(package), attribute)

@@ -34,7 +34,7 @@ def of_block(name: str, work: Work, **facts: Any) -> Event:
 
 
 def ended(work: Work, outcome: Outcome) -> Event:
-    """Return the event of a finished block, which counts as failed if any of its results has failed."""
+    """Return the event of a finished block. A block with at least one failed result counts as failed."""
     counts = {state.name.lower(): outcome.counts[state] for state in Status if outcome.counts[state]}
     failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
     seconds = outcome.compute_seconds + outcome.write_seconds
@@ -43,7 +43,7 @@ def ended(work: Work, outcome: Outcome) -> Event:
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a run, counted in results. A result is one case in one realisation."""
+    """The progress of a run. A result is one case in one realisation."""
 
     # Numbers of results: in all rounds that have begun (`total`), in the store before the run (`kept`), and written by
     # this run (`done`, `failed` or not converged, and `not_needed`).
@@ -63,7 +63,7 @@ class Progress:
     estimated: float = 0.0
     finished: float = 0.0
     # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the
-    # start of the run. The first three are sums over all threads.
+    # start of the run. The first three times are sums over all threads.
     compute_seconds: float = 0.0
     compile_seconds: float = 0.0
     write_seconds: float = 0.0
@@ -85,7 +85,7 @@ class Progress:
         return pace * max(self.estimated - self.finished, 0.0) / side_by_side
 
     def after(self, outcome: Outcome, wall_seconds: float) -> Progress:
-        """Return the state after one more block has ended, `wall_seconds` after the start of the run."""
+        """Return the progress after one more block has ended, `wall_seconds` after the start of the run."""
         counts = outcome.counts
         return replace(
             self,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Number of blocks submitted at a time for each thread, so that no thread waits for its next block.
+#: Number of blocks submitted at a time for each thread. With more than one block, no thread waits for a new block.
 AHEAD = 2
 
 
@@ -49,14 +49,14 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.__exit__(*reason)
 
     def apart(self) -> None:
-        """Compute all blocks in child processes, because a case may have crashed the last run."""
+        """Choose child processes for all blocks. Call this method if a case may have crashed the last run."""
         if hasattr(os, "fork") and not self._resources.remote and not self._is_apart:
             self._is_apart = True
             sentence = "the last run was killed or crashed: blocks are computed in child processes, to find the cause"
             self._tell(Event("after a crash", {}, sentence))
 
     def connect(self) -> None:
-        """Start or connect to the cluster that the resources name, if any. Call this before anything is written."""
+        """If the resources name a cluster, start it or connect to it. Call this method before anything is written."""
         if self._resources.remote and self._window is None:
             from mdr_dask.execute.clusters import task_window
 
@@ -79,7 +79,7 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _in_pool(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks in threads; after an error or an interrupt, wait for blocks that have started."""
-        pool = ThreadPoolExecutor(self._threads)  # without `with`, whose end would wait even after a second interrupt
+        pool = ThreadPoolExecutor(self._threads)  # a `with` statement would wait after a second interrupt
         remaining = iter(works)
         running: set[Future[list[tuple[Work, Outcome]]]] = set()
         try:

@@ -1,8 +1,8 @@
-"""Run a campaign stage after stage and round after round, until no result is missing in its store.
+"""Run a campaign stage after stage and round after round, until no result is missing in the store.
 
 A stage is the campaign with the values that its adaptive axes have so far. The first round of a stage computes the
-first realisations of all cases; further rounds add realisations to cases whose errors are too large. The stored results
-determine the next stage and round, so a run can be stopped and repeated at any time.
+first realisations of all cases. Further rounds add realisations to cases whose errors are too large. The stored results
+determine the next stage and round. A run can therefore be stopped and repeated at any time.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class _Job:
 class _Round:
     # Shape, chunks and coordinates of every group of the store.
     layout: tuple[Template, ...]
-    # For each group, masks of the cases of the stage, and of the cases that need the realisations of this round.
+    # Masks for each group. `asked`: cases of the stage. `needed`: cases that need the realisations of this round.
     asked: list[BoolArray]
     needed: list[BoolArray]
     # Index of the first realisation of the round, and index of its last realisation plus 1.
@@ -68,10 +68,10 @@ def run(
     part: Part | None = None,
     tell: Tell = lambda _: None,
 ) -> Progress:
-    """Compute the results of a campaign that are missing in its store, and return the final progress.
+    """Compute the results of a campaign that are missing in the store, and return the final progress.
 
-    `report` receives the progress after every block, and `tell` every event, from any thread. With a `part`, only the
-    blocks of this part are computed and counted, while other parts may run at the same time.
+    `report` receives the progress after every block. `tell` receives every event, from any thread. With a `part`, only
+    the blocks of this part are computed and counted. Other parts may run at the same time.
     """
     if campaign.replication.answers:
         from mdr_dask.fits.answers import require_known
@@ -79,11 +79,11 @@ def run(
         require_known(campaign)
     models.require_current(campaign.model)
     stage = Stage.first(campaign)
-    stored_layout(stage, url)  # if this raises an error, nothing has been locked yet
+    stored_layout(stage, url)  # an error raised here leaves nothing locked
     url = store.absolute(url)  # a model may change the working directory later
     with Executor(resources, campaign.model, tell) as execute:
         if not store.exists(url):
-            execute.connect()  # if this fails, no store is created
+            execute.connect()  # after a failure here, no store is created
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
             if store.exists(url):
                 store.require_undamaged(url, store.series_names(url), to_run=True)
@@ -109,10 +109,10 @@ def _merge(job: _Job) -> None:
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
-    """Return how many results of a campaign are in its store and how many are missing.
+    """Return how many results of a campaign are in the store and how many results are missing.
 
-    The first rounds of the stages are counted, up to the first unfinished stage. If outputs have tolerances for their
-    standard errors, only the first stage is counted.
+    The count includes the first round of every stage up to the first unfinished stage. If outputs have tolerances for
+    their standard errors, only the first stage is counted.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -168,7 +168,7 @@ def _run_stages(job: _Job) -> Progress:
 def _run_rounds(
     job: _Job, run_round: Callable[[_Round, list[Cells]], None], current: _Round | None = None
 ) -> _Round | None:
-    """Run the rounds of a stage and return the last; return None if an unfinished part is not running."""
+    """Run the rounds of a stage and return the last round. Return None if an unfinished part is not running."""
     replication = job.stage.campaign.replication
     while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
         further = _next(job, current)
@@ -207,7 +207,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return the job without tolerances of fitted constants, for the stages before the last."""
+    """Return the job without tolerances of fitted constants, for the stages before the last stage."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))
@@ -246,7 +246,7 @@ def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Temp
 
 
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
-    """Return the factor by which the number of realisations of each case must grow, at most 1 if it has enough."""
+    """Return the factor by which the realisations of each case must grow; at most 1 if the case has enough."""
     own = [
         np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
         for mask, template in zip(last.needed, layout, strict=True)

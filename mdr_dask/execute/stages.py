@@ -18,7 +18,7 @@ Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout that the store needs for a stage, and the positions that its cases have in this layout."""
+    """Return the layout that the store needs for a stage, and the positions of the stage's values in the layout."""
     campaign = stage.campaign
     if not store.exists(url):
         layout = templates(campaign, campaign.replication.at_least)
@@ -47,9 +47,10 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage after a finished stage, or None, and an event with the number of values on each adaptive axis.
+    """Return the stage that follows a finished stage (None after the last stage), and an event with the lengths of the
+    axes.
 
-    Only the first `realisations` realisations of each case are used.
+    The event holds the number of values on each adaptive axis. Only the first `realisations` realisations are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}
@@ -66,7 +67,7 @@ def following(
 
 
 def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
-    """Return a sentence that says why interpolation along an adaptive axis misses its tolerance in some cases."""
+    """Return a sentence that says why interpolation along an adaptive axis misses the tolerance in some cases."""
     axis, values = mesh.series.axes[number], mesh.used[number].sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
     why = f"at_most is {most} values" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"

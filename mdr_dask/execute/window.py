@@ -30,18 +30,20 @@ ANSWER_LIMIT = 3.0
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
 
-#: `_OPEN`: context that ends the child process of a worker with the worker. `_APART`: lock on the child process.
+#: `_OPEN`: context that keeps the child process of a worker until the worker ends. `_APART`: lock held while the child
+#: process computes.
 _OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]
 
 
 class TaskWindow:
-    """The blocks that are submitted to a cluster at the same time: a few more than the cluster can compute at once.
+    """The blocks that are submitted to a cluster at the same time: about twice as many as the cluster has threads.
 
-    The run ends with an error after `patience` seconds without any worker, and a case fails after `case_timeout`
-    seconds. `most` is the largest number of threads of an adaptive cluster, and 0 for other clusters. `replace_lost`,
-    if given, replaces lost workers. `last_message` returns the last error message of the cluster.
+    The run ends with an error after `patience` seconds without any worker. A case fails after `case_timeout` seconds.
+    `most` is the largest number of threads of an adaptive cluster. For other clusters, `most` is 0. The function
+    `replace_lost`, if given, replaces lost workers. The function `last_message` returns the last error message of the
+    cluster.
     """
 
     def __init__(
@@ -65,7 +67,7 @@ class TaskWindow:
         client.subscribe_topic("all", self._report_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks; if the worker of a block dies, compute the block once more, in a child process."""
+        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process."""
         remaining = iter(works)
         suspects: set[tuple[str, BlockIndex]] = set()
 
@@ -146,7 +148,7 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the outcomes of a task, or None if its workers died; turn other known errors into a ClusterError."""
+    """Return the outcomes of a task, or None if workers died. Turn other known errors into a ClusterError."""
     from concurrent.futures import CancelledError
 
     try:
@@ -184,5 +186,5 @@ def _report(work: Work) -> None:
 
 @lru_cache(maxsize=1)
 def _child(model: str) -> Child:
-    """Return the child process of this worker, which ends with the worker."""
+    """Return the child process of this worker. The child ends when the worker ends."""
     return _OPEN.enter_context(children(1, model))[0]

@@ -24,14 +24,14 @@ GROUP = "mdr_dask.plots"
 
 
 def available(model: str) -> dict[str, Plot]:
-    """Return the figures for stores of a model, indexed by name, including those from other packages (see `GROUP`)."""
+    """Return the figures of a model, indexed by name, including the figures of other packages (see `GROUP`)."""
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return the figures of a model; if it has no figures of its own, also one for each output that varies."""
+    """Return the figures of a model. A model without its own figures gets one figure for each output that varies."""
     from mdr_dask.plots.view import figure_of, varied
 
     known = available(model)

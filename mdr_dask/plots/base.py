@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 class Plot:
     """A figure that has a name. The function `draw` receives the groups of a store, indexed by the name of the series.
 
-    `models` are the names of the models that have this figure; if `models` is empty, all models have it. `summary`
-    names the quantities on both axes. `fitted` is true if the figure shows a fit; such a figure takes a long time in a
-    large study.
+    `models` are the names of the models that have this figure. If `models` is empty, all models have the figure.
+    `summary` names the quantities on both axes. `fitted` is true if the figure shows a fit. A fit takes a long time in
+    a large study.
     """
 
     name: str

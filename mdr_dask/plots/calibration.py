@@ -51,7 +51,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset, list[str]]:
-    """Calibrate the first series that can be compared with its table of measurements.
+    """Calibrate the first series that can be compared with a table of measurements.
 
     The last value returned is a list of texts that say why the other series are not drawn.
     """

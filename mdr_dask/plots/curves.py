@@ -27,12 +27,12 @@ class Curve(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Curves against one parameter, with the entries of their legend.
+    """Curves against one parameter, with the entries of the legend.
 
-    `bar` is a colour bar if the curves have more values than there are colours, otherwise None. `held` are the
-    parameters that have one value in all curves. `left_out` are texts about the values that are not drawn. `varying`
-    are the parameters that change from point to point in a sampled study, but that neither the axis nor the colours
-    show.
+    `bar` is a colour bar if the curves need more colours than there are, otherwise None. `held` are the parameters that
+    have the same value in all curves. `left_out` are texts about the values that are not drawn. `varying` are
+    parameters that change from point to point in a sampled study. Neither the axis nor the colours show these
+    parameters.
     """
 
     curves: list[Curve]
@@ -74,7 +74,7 @@ def axes_of(data: xr.Dataset, output: str) -> list[str]:
 
 
 def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
-    """Return the dimension along which a parameter varies, or None if it is fixed."""
+    """Return the dimension along which a parameter varies, or None for a parameter that does not vary."""
     if along in data[output].dims:
         return along
     if along in data.coords and data[along].ndim == 1 and data[along].dims[0] in data[output].dims:
@@ -103,7 +103,7 @@ def _only_one(data: xr.Dataset, dim: str, place: int) -> str:
 
 
 def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
-    """Return a series with at most `most` evenly spread values along an axis, and a text about the values left out."""
+    """Return a series with at most `most` evenly spread values of an axis, and a text about the omitted values."""
     size = data.sizes[dim]
     if size <= most:
         return data, []
@@ -118,10 +118,10 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
     """Split a series into curves against the parameter `along`.
 
     The curves differ in the parameter `by`. Without `by`, there is a curve for every combination of values of the other
-    axes. If there would be more curves than colours, colours show the values of one axis, and line styles show the
-    values of a second axis if it has few values. All axes that are not shown are fixed at their middle value. If the
-    axis shown by colours has more values than there are colours, numbers have a colour bar, and some words are left
-    out. The label of each curve begins with the name `series`. The first curve gets the colour with the number `first`.
+    axes. If there would be more curves than colours, colours show the values of one axis. Line styles show the values
+    of a second axis with few values. Every other axis is fixed at the middle value. If the axis shown by colours has
+    more values than there are colours, a colour bar shows numbers, and some words are left out. The label of each curve
+    begins with the name `series`. The first curve gets the colour with the index `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
@@ -236,7 +236,7 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have a single value, without those that have no effect in this series."""
+    """Return the parameters of a series that have a single value and an effect in this series."""
     requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
     idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
@@ -280,7 +280,7 @@ def parameters_of(data: xr.Dataset) -> dict[str, Any]:
 
 
 def parameters_at(case: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of one case: the fixed parameters of its series, and its values on the axes."""
+    """Return the parameters of one case: the fixed parameters of the series, and the values of the case on the axes."""
     parameters = parameters_of(case)
     for axis in case.attrs.get("axes", []):
         *above, last = axis["path"].split(".")

@@ -13,7 +13,7 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
 
-#: In the table of a figure: the columns to the left of the parameters, and those to the right of the parameters.
+#: In the table of a figure: the columns to the left of the parameters, and the columns to the right.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
 #: Entry of the column ``what`` for results of a study.
@@ -22,7 +22,7 @@ Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values, and the two ends of their intervals. The ends are NaN if the error is unknown."""
+    """Values with the lower and upper limits of intervals. The limits are NaN if the error is unknown."""
 
     value: Any
     low: Any
@@ -33,9 +33,9 @@ class Mean(NamedTuple):
 class Axis:
     """An axis of a panel. Symbols in the label are mathtext between dollar signs.
 
-    If the values are words, `ticks` are the positions and texts of the ticks. If the limit `low` or `high` is None, it
-    follows from the data. `quantity` is the name of the parameter or output on the axis; it is empty if a derived
-    quantity is on the axis. `reverse` means that values increase downwards or to the left.
+    If the values are words, `ticks` are the positions and texts of the ticks. If the limit `low` or `high` is None, the
+    data determine this limit. `quantity` is the name of the parameter or output on the axis. If a derived quantity is
+    on the axis, `quantity` is empty. `reverse` means that values increase downwards or to the left.
     """
 
     label: str
@@ -74,9 +74,9 @@ class Trace:
     Kinds: ``curve`` and ``law`` consist of points, which are joined if `line` is not empty; ``band`` fills the area
     from ``y_low`` to ``y_high``; ``dots`` and the cells of a ``map`` are coloured by ``value``; ``absent`` are marks at
     the lower edge of the panel. The variables of `data` are ``x``, ``y`` and ``value`` in the units of the axes, and
-    the ends of their intervals where these are known, such as ``y_low`` and ``y_high``. The coordinates of `data` are
-    the parameters of each point in SI. `what` is ``data``, the name of a law, or the reason why cases have no value.
-    `bars` draws intervals as bars instead of a band.
+    known limits of intervals, such as ``y_low`` and ``y_high``. The coordinates of `data` are the parameters of each
+    point in SI units. `what` is ``data``, the name of a law, or the reason why cases have no value. `bars` draws
+    intervals as bars instead of a band.
     """
 
     kind: Kind
@@ -108,7 +108,7 @@ class Trace:
 
 @dataclass
 class Panel:
-    """A panel; without `keys` and without a colour bar, every trace with a label is an entry of the legend."""
+    """A panel. Without `keys` and without a colour bar, every trace with a label is an entry of the legend."""
 
     x: Axis
     y: Axis
@@ -128,7 +128,7 @@ class Panel:
 class Figure:
     """A figure as data.
 
-    With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form the next column; with ``stack = 1``, the
+    With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form the next column. With ``stack = 1``, the
     panels fill row after row. `fixed` is a text with the fixed parameters, and `bars` is a text that explains the error
     bars and bands. `left_out` are texts about results that are not drawn. `notes` are texts for the caption and the
     table. `ratio` is the height of a panel divided by its width. `share_y` gives all panels the same vertical axis.
@@ -144,7 +144,7 @@ class Figure:
     stack: int = 1
     ratio: float = 0.7
     share_y: bool = False
-    #: States of the results that belong to the figure. None stands for all results of the series.
+    #: States of the results that belong to the figure. None means all results of the series.
     states: Sequence[xr.DataArray] | None = None
 
     def leave_out(self, sentences: Iterable[str]) -> None:
@@ -161,8 +161,8 @@ class Figure:
     def table(self) -> pd.DataFrame:
         """Return a table with a row for every point.
 
-        ``x``, ``y`` and ``value`` are in the units of the axes, parameters in SI. Parameters that are the same for all
-        points are in ``attrs["held"]``, and the units of all parameters in ``attrs["units"]``.
+        ``x``, ``y`` and ``value`` are in the units of the axes. Parameters are in SI units. Parameters with the same
+        value at all points are in ``attrs["held"]``. The units of all parameters are in ``attrs["units"]``.
         """
         frames = [trace.frame().assign(panel=k + 1) for k, panel in enumerate(self.panels) for trace in panel.traces]
         frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
@@ -214,7 +214,7 @@ def _number(value: Any) -> str:
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
     """Return the data of a trace: the given arrays (``x``, ``y``, ``value``), with the parameters from `of`. A `Mean`
-    gives three arrays, such as ``y``, ``y_low`` and ``y_high``; unknown ends are left out.
+    gives three arrays, such as ``y``, ``y_low`` and ``y_high``. Unknown limits are left out.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():

@@ -31,7 +31,7 @@ STEADY = "steady state at the end"
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time, one column of panels for each series.
 
-    Velocity and normal force have panels only if they change.
+    The velocity has a panel only if the velocity changes, and the normal force only if the normal force changes.
     """
     needed = {BEFORE, JUMP, FRICTION}
     found = {name: data for name, data in groups.items() if needed <= data.keys() and data[FRICTION].notnull().any()}

@@ -26,7 +26,7 @@ LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", 
 
 
 class Law(NamedTuple):
-    """A law of an output: its name in the legend, and a function that computes the output in SI.
+    """A law of an output: the name of the law in the legend, and a function that computes the output in SI units.
 
     The function uses the parameters and the outputs `NEEDED`.
     """

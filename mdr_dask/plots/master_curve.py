@@ -19,7 +19,7 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 def draw_master_curve(curve: xr.Dataset) -> Figure:
     """Draw a master curve: the curves as measured, the merged curve and the shift factors.
 
-    Bars and band are 68 % intervals. The merged curve is solid in the range that was measured in the reference
+    The bars and the band show 68 % intervals. The merged curve is solid in the range that was measured in the reference
     condition, such as the reference temperature, and dashed outside this range.
     """
     curve = _in_shown_units(curve)
@@ -56,7 +56,7 @@ def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _channels(curve: xr.Dataset) -> dict[str, str]:
-    """Return names and markers of the ordinates: a master curve has one ordinate, or two that were shifted together."""
+    """Return names and markers of the ordinates. A master curve has one ordinate, or two that were shifted together."""
     return {name: marker for name, marker in (("ordinate", "."), ("companion", "x")) if f"curve_{name}" in curve}
 
 

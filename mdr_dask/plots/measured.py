@@ -71,7 +71,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _apart(measured: Measured, data: xr.Dataset, names: Sequence[str]) -> list[str]:
-    """Return a warning for each quantity whose measured values are all above or all below those of a study."""
+    """Return a warning for each quantity whose measured values are all above or all below the values in the study."""
     warnings = []
     for name in names:
         values, known = measured.conditions.get(name, measured.values), data[name]
@@ -133,7 +133,7 @@ def _at(curve: xr.Dataset, measured: Measured, data: xr.Dataset, along: str) -> 
 
 
 def _on(axis: Axis, places: FloatArray) -> np.ndarray:
-    """Return a mask of the numbers that an axis can show: a logarithmic axis cannot show zero or negative numbers."""
+    """Return a mask of the numbers that an axis can show. A logarithmic axis cannot show zero or negative numbers."""
     return np.isfinite(places) & ((places > 0) | (not axis.log))
 
 

@@ -36,10 +36,10 @@ COLUMN, TALLEST = 0.085 / INCH, 0.23 / INCH
 class Page:
     """The requested appearance of a figure.
 
-    `width` and `height` are in inches; without a height, the height follows from the content. If `title` is None, the
-    title is a description of the figure, or empty if a width is requested. `style` is a style or style file of
-    matplotlib, and `cycle` holds the colours, lines and markers of this style. `units` maps names of quantities to the
-    requested units, and `symbols` maps names of coordinates to their labels. `used` collects the names of all
+    `width` and `height` are in inches. Without a requested height, the height follows from the content. If `title` is
+    None, the title is a description of the figure, or empty if a width is requested. `style` is a style or style file
+    of matplotlib, and `cycle` holds the colours, lines and markers of this style. `units` maps names of quantities to
+    the requested units, and `symbols` maps names of coordinates to their labels. `used` collects the names of all
     quantities that figures have shown.
     """
 
@@ -53,7 +53,7 @@ class Page:
     cycle: tuple[Mapping[str, str], ...] = ()
 
     def unit(self, name: str) -> str | None:
-        """Return the requested unit of a quantity; None if no unit was requested."""
+        """Return the requested unit of a quantity, or None if no unit was requested."""
         self.used.add(name)
         return self.units.get(name)
 
@@ -93,7 +93,7 @@ def drawing_for(page: Page) -> Iterator[None]:
 
 @contextmanager
 def with_labels(units: Mapping[str, str], symbols: Mapping[str, str]) -> Iterator[None]:
-    """Within a ``with`` statement, label quantities with these symbols and units unless the user requested others."""
+    """Within a ``with`` statement, use these symbols, and these units unless the user requested other units."""
     token = _PAGE.set(replace(current(), units={**units, **current().units}, symbols=symbols))
     try:
         yield
@@ -107,7 +107,7 @@ def current() -> Page:
 
 
 def sides(text: str) -> tuple[float, float | None]:
-    """Return width and height in inches from a text such as ``85x60mm``; ``85mm`` gives the width alone."""
+    """Return width and height in inches from a text such as ``85x60mm``. From ``85mm``, return the width alone."""
     match = re.fullmatch(r"([\d.]+)\s*([a-z]*)(?:\s*x\s*([\d.]+)\s*([a-z]+))?", text.strip())
     if match is None or not (match[2] or match[4]):
         raise DataError(f"expected a width such as '85mm', or width and height such as '85x60mm', got {text!r}")

@@ -26,7 +26,7 @@ MANY_POINTS = 60
 
 
 class Drawn(MplFigure):
-    """A matplotlib figure with its description; a notebook shows it as a picture."""
+    """A matplotlib figure with the description of the figure. A notebook shows the figure as a picture."""
 
     def __init__(self, description: Figure, **options: Any) -> None:
         super().__init__(**options)
@@ -44,7 +44,7 @@ class Drawn(MplFigure):
         return self.description.table()
 
     def save(self, path: str | Path) -> None:
-        """Write the figure to a file, and the table of the figure beside it: ``mu.pdf`` and ``mu.csv``."""
+        """Write the figure to a file, and the table of the figure to the same folder: ``mu.pdf`` and ``mu.csv``."""
         beside = table_beside(path)
         self.savefig(path, dpi=150 if page.current().width is None else 300)
         with beside.open("w", encoding="utf-8", newline="") as stream:
@@ -194,7 +194,7 @@ def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
 
 
 def _lengths(value: Any, low: Any, high: Any) -> Any:
-    """Return the lengths of error bars below and above the value; 0 if the error is unknown."""
+    """Return the lengths of error bars below and above the value. The length is 0 if the error is unknown."""
     return np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
 
 
@@ -252,9 +252,7 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
 
 
 def _title(figure: Drawn, description: Figure) -> float:
-    """Write the title and return its height in inches. At a requested size there is none, unless the user
-    gives one.
-    """
+    """Write the title and return its height in inches. If a size is requested, write only a title from the user."""
     asked = page.current()
     if asked.title is not None or asked.width is not None:
         lines = [asked.title] if asked.title else []
@@ -340,7 +338,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn) -> None:
-    """Break long labels, and remove ticks that overlap. This is repeated, because the axes then change their size."""
+    """Break long labels, and remove overlapping ticks. Both steps change the size of axes, and are repeated."""
     for _ in range(4):
         figure.draw_without_rendering()
         changed = False

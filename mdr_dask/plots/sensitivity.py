@@ -1,4 +1,4 @@
-"""The figure of Sobol indices with their intervals."""
+"""The figure of Sobol indices with intervals."""
 
 from __future__ import annotations
 

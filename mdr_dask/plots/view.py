@@ -36,15 +36,15 @@ SOME = "v", "mean without realisations that failed"
 
 @dataclass(frozen=True)
 class View:
-    """The description of a figure of outputs; several outputs are drawn one above the other.
+    """The description of a figure of outputs. Several outputs are drawn one above the other.
 
-    `over` is the parameter on the horizontal axis; with two parameters, the figure is a map, and with none, it shows
-    the main effects of all parameters. Colours show the values of the parameter `by`. There is one panel for each value
-    of the parameter `panels`. `log` contains the letters of the logarithmic axes (x, y, and z for colours); by default,
-    an axis is logarithmic if its numbers are positive and span more than a factor of ten, but an output that is a pure
-    number has a linear axis, and so has an output against a dimension of its own, such as a profile. If `single` is
-    true, the first realisation is drawn instead of the mean. If `apart` is true, every curve has its own panel.
-    `guides` contains the positions and names of horizontal lines for each output.
+    `over` is the parameter on the horizontal axis. With two parameters, the figure is a map. With no parameter, the
+    figure shows the main effects of all parameters. Colours show the values of the parameter `by`. There is one panel
+    for each value of the parameter `panels`. `log` contains the letters of the logarithmic axes (x, y, and z for
+    colours). If `log` is None, an axis is logarithmic if the numbers are positive and span more than a factor of ten.
+    An output that is a pure number then has a linear axis. For an output against its own dimension, such as a profile,
+    both axes are then linear. If `single` is true, the first realisation is drawn instead of the mean. If `apart` is
+    true, every curve has its own panel. `guides` contains the positions and names of horizontal lines for each output.
     """
 
     outputs: str | tuple[str, ...]
@@ -67,16 +67,16 @@ class View:
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
     def is_log(self, which: str, values: Any, how: labels.Quantity) -> bool:
-        """Return whether an axis is logarithmic. By default, an axis in degC is linear."""
+        """Return whether an axis is logarithmic. If `log` is None, an axis in degC is linear."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
         return not how.offset and labels.is_geometric(values) if self.log is None else which in self.log and positive
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Of all parameters with which an output varies, return the one with the most values. If the output has a dimension
-    of its own, such as time, this dimension is returned instead. In a sampled study, the result is empty, so that the
-    figure shows main effects.
+    """Return the parameter that has the most values among the parameters with which an output varies. If the output has
+    its own dimension, such as time, return this dimension instead. In a sampled study, return an empty tuple: the
+    figure then shows main effects.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -110,7 +110,7 @@ def figure_of(
     panels: str = "",
     log: str | None = None,
 ) -> Plot:
-    """Return the figure of an output, by default against its `main_axis`; see `View` for the arguments."""
+    """Return the figure of an output. If `over` is None, `main_axis` replaces it. `View` explains the arguments."""
     view = View(output, main_axis(groups, output, (by, panels)) if over is None else over, by, panels, log)
     summary = f"{output} against {' and '.join(view.along) or 'every parameter that varies'}".replace("_", " ")
     return Plot(output, (), summary, lambda groups: draw(groups, view))
@@ -157,7 +157,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
 
 
 def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[dict[str, xr.Dataset], list[str]]:
-    """Return the series that can be drawn as requested, and the reasons why the other series cannot."""
+    """Return the series that can be drawn as requested, and the reasons why the other series cannot be drawn."""
     known = sorted({str(name) for data in groups.values() for name in data.data_vars if name != "status"})
     if output not in known:
         hint = did_you_mean(output, known)
@@ -289,8 +289,8 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
     """Divide the curves of a figure into panels. Also return texts about what is left out.
 
-    With `View.panels`, each value of this parameter has a panel; with `View.apart`, each curve has one. Otherwise there
-    is one panel, or one for each series if one panel would have more curves than colours.
+    With `View.panels`, each value of this parameter has a panel. With `View.apart`, each curve has a panel. Otherwise
+    there is one panel, or one for each series if one panel would have more curves than colours.
     """
     if view.panels:
         return _by_value(found, view)
@@ -423,8 +423,8 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 
 
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw an output against two parameters. The cases of a grid are drawn as cells, those of a sampled study as
-    points.
+    """Draw an output against two parameters. The cases of a grid are drawn as cells. The cases of a sampled study are
+    drawn as points.
     """
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without 'by', because colours show the values")

@@ -1,4 +1,4 @@
-"""Means and errors of all cases of a study. The page draws them against axes that its reader chooses."""
+"""Means and errors of all cases of a study. The page draws these means against axes that the reader chooses."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ Json = dict[str, Any]
 def drawn_of(
     figures: Mapping[str, Plot], groups: Mapping[str, xr.Dataset], provenance: Any
 ) -> Iterator[Json | tuple[str, str]]:
-    """Yield each figure as data, or the name of the figure and the reason why it cannot be drawn."""
+    """Yield each figure as data, or the name of a figure and the reason why this figure cannot be drawn."""
     for name, each in figures.items():
         try:
             figure = each.describe(groups)

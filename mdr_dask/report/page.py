@@ -1,7 +1,7 @@
 """The page: one HTML file that contains all data and scripts.
 
-Nothing in a store can run as a script: the template escapes texts, data are a block of JSON, and the content security
-policy admits only this package's own scripts, identified by their digests.
+Nothing in a store can run as a script. The template escapes texts. Data are a block of JSON. The content security
+policy admits only the scripts of this package, identified by the digests of the scripts.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def policy() -> str:
 
 
 def harmless(data: Any) -> str:
-    """Return data as JSON that cannot end the HTML element ``script`` around it."""
+    """Return data as JSON that cannot end the HTML element ``script`` around the JSON."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
 

@@ -65,8 +65,8 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that it names. A file outside the folder of the campaign is renamed into this
-    folder, and the campaign then contains the new name.
+    """Return the campaign and the files that the campaign names. The returned name of a file outside the folder of the
+    campaign has no folder. The returned campaign contains this name.
     """
     text, found = study.campaign, {}
     for file in _named_files(url):

@@ -47,10 +47,10 @@ class Study:
     """The content of a page about one study.
 
     `understood` are tables that show how the campaign was understood: axes, fixed parameters and outputs. `failures`
-    are failures and warnings, grouped by message without regard to its numbers. `not_fitted` are the laws that cannot
-    be fitted and `not_drawn` the figures that cannot be drawn, both with the reasons. The data in `figures` are made by
-    the module `mdr_dask.report.figures`, those in `cases` by `mdr_dask.report.cases`. `rerun` are commands that compute
-    the study again, and `at_work` names the runs that are computing it now.
+    are failures and warnings. Messages that differ only in numbers form one group. `not_fitted` are the laws that
+    cannot be fitted, with reasons. `not_drawn` are the figures that cannot be drawn, with reasons. The module
+    `mdr_dask.report.figures` makes the data in `figures`, and `mdr_dask.report.cases` makes the data in `cases`.
+    `rerun` are commands that compute the study again, and `at_work` names the runs that are computing it now.
     """
 
     url: str
@@ -77,7 +77,7 @@ class Study:
 
 
 def read_study(url: str) -> Study:
-    """Read the content of a page about a study, which may be unfinished."""
+    """Read the content of a page about a study. The study may be unfinished."""
     with store.readable(url):
         whole = store.datasets(url)
         read = {name: thinned(data) for name, data in whole.items()}
@@ -140,7 +140,7 @@ def _study(
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure shows no intervals; such figures come last on the page."""
+    """Return whether a figure shows no intervals. Figures without intervals come last on the page."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 
@@ -274,7 +274,7 @@ def _law(url: str, name: str, summary: str, result: xr.Dataset) -> Table:
 
 
 def _interval(row: Mapping[Any, Any], name: str) -> str:
-    """Return a fitted constant as text, followed by the two ends of its interval if they are known."""
+    """Return a fitted constant as text, followed by the limits of the interval if these limits are known."""
     low, high = (row.get(f"{name}{end}", np.nan) for end in ("_low", "_high"))
     return f"{_cell(row[name])} ({_cell(low)}, {_cell(high)})" if np.isfinite([low, high]).all() else _cell(row[name])
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Equation(NamedTuple):
-    """An equation in LaTeX, and its meaning."""
+    """An equation in LaTeX, and the meaning of the equation."""
 
     latex: str
     meaning: str
@@ -15,8 +15,8 @@ class Equation(NamedTuple):
 class Subject(NamedTuple):
     """The description of the method of a model: a paragraph for a paper, the equations, and the papers to cite.
 
-    `can` lists statements that the results support, `cannot` lists statements that they do not support. `page` is the
-    path of a page of the documentation.
+    `can` lists statements that the results support. `cannot` lists statements that the results do not support. `page`
+    is the path of a page of the documentation.
     """
 
     method: str

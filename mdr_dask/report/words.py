@@ -1,4 +1,4 @@
-"""Convert labels of figures to HTML: mathtext becomes subscripts and superscripts, all other text is unchanged."""
+"""Convert labels of figures to HTML. Mathtext becomes subscripts and superscripts. All other text is unchanged."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Place:
     index: BlockIndex
     # The slice of the arrays that the block fills, along each axis and then along ``realisation``.
     region: tuple[slice, ...]
-    # The `layout_mark` that the driver found in the store. A worker that finds a different mark writes nothing.
+    # The `layout_mark` that the driver found in the store. A worker that finds another mark writes nothing.
     layout: str
     lock: Lock
 
@@ -55,7 +55,7 @@ def write_block(
     status: NDArray[np.int8],
     record: Mapping[str, Any],
 ) -> None:
-    """Write a block: first its record, then one whole chunk of every output, and finally its chunk of the ledger.
+    """Write a block: first the record, then one whole chunk of every output, and finally the chunk of the ledger.
 
     Each array of `values` has the shape of the region, followed by the further dimensions of the output. `values` is
     empty if only the ledger changes.
@@ -97,7 +97,7 @@ def values(url: str, series: str, output: str) -> NDArray[np.float64]:
 
 
 def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
-    """Return the named arrays of a group, by default the ledger and all outputs."""
+    """Return the named arrays of a group, or the ledger and all outputs if no name is given."""
     held = document(url, series)
     if held is None:
         raise StoreError(f"{url}: this store, or one of its groups, has been removed")
@@ -108,7 +108,7 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
-    """Return the arrays of a group, which are cached until the layout changes."""
+    """Return the arrays of a group. The arrays are cached until the layout changes."""
     found, here = layout_mark(url), platform.node()
     if found != layout:
         what = f"{here} finds another store at this path, or a later shape of it" if found else f"not seen from {here}"
@@ -118,7 +118,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return copies in memory of the arrays of a group, without values, and the dictionary of their encoded chunks."""
+    """Return arrays in memory like those of a group, without values, and the dict that receives encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory, empty = zarr.storage.MemoryStore(encoded), {}
     for name, array in shown.items():

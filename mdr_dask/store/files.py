@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 #: Name of the group at the root if the store also has series.
 ROOT = "-"
-#: Folder with claims, which replace locks in a store on a server or on a file system without locks.
+#: Folder with claims. Claims replace locks on a server, and on a file system without locks.
 CLAIMS = ".claims/"
 #: Folder with the record of the layout (`mdr_dask.store.integrity`).
 RECORD_FOLDER = ".layout"
@@ -34,11 +34,11 @@ RECORD_FOLDER = ".layout"
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server: enough to hide the time until the server answers.
 AT_ONCE = 64
-#: Time in s after which a request to a server without an answer fails.
+#: Time in s after which a request fails if the server has not answered.
 LONGEST_REQUEST = 120.0
 #: Number of threads that flush files to the disk; a block has about ten files.
 FLUSHERS = 8
-#: Version of the layout; stores of a later version are refused. Since version 2, records hold digests of all chunks.
+#: Version of the layout. Stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
 
 
@@ -56,7 +56,7 @@ async def _answered(request: Awaitable[T]) -> T:
 
 
 class _RemoteStore(zarr.storage.FsspecStore):
-    """A Zarr store at a URL, whose requests fail if the server does not answer in time."""
+    """A Zarr store at a URL. A request fails if the server does not answer in time."""
 
     async def get(self, *arguments: Any, **options: Any) -> Any:
         return await _answered(super().get(*arguments, **options))
@@ -70,7 +70,7 @@ class _RemoteStore(zarr.storage.FsspecStore):
 
 @lru_cache(maxsize=16)
 def bytes_of(url: str) -> Any:
-    """Return the Zarr store at a path or URL, which maps names of files to bytes."""
+    """Return the Zarr store at a path or URL. A Zarr store maps names of files to bytes."""
     path = local(url)
     if path is not None:
         return zarr.storage.LocalStore(path)
@@ -118,7 +118,7 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
 
 
 def parsed(content: bytes) -> Any:
-    """Return the content of a JSON text; raise ValueError if it is not JSON."""
+    """Return the content of a JSON text; raise ValueError if the text is not JSON."""
     try:
         return json.loads(content)
     except RecursionError:
@@ -159,7 +159,7 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 
 
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
-    """Write files in stages: each file is replaced in one step, after all files of the earlier stages.
+    """Write files in stages. Every file is replaced in one step, after all files of the earlier stages.
 
     On a disk, all files are first written under temporary names and flushed. Files of the last stage get their final
     names after the final names of the earlier stages have been flushed.
@@ -243,7 +243,7 @@ def flush(path: Path) -> None:
 
 
 def create(url: str, name: str, content: bytes) -> bool:
-    """Write a new file and return True; if a file of that name exists, leave it unchanged and return False."""
+    """Write a new file and return True. If a file of this name exists, return False and leave the file unchanged."""
     path = local(url)
     with guarded(url, f"writing {name}"):
         try:
@@ -260,7 +260,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic, as it is for local files and on servers that create a file in one request."""
+    """Return whether `create` is atomic: always for local files, and on servers that create a file in one request."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -294,7 +294,7 @@ def require_bucket(url: str) -> None:
 
 
 def sweep(url: str) -> None:
-    """Remove the temporary files of killed processes; call this only while no other run is active in the store."""
+    """Remove temporary files of killed processes. Call this only while no other run is active in the store."""
     path = local(url)
     if path is not None and path.is_dir():
         with guarded(url, "removing what a killed run left"):
@@ -326,18 +326,18 @@ def _raise_unless_gone(error: OSError) -> None:
 
 
 def group_name(series: str, member: str = "") -> str:
-    """Return the path of the group of a series (without a series: the root), or of a member of this group."""
+    """Return the path of the group of a series, or of a member of this group. The root has an empty path."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block in an array with `further` dimensions that the ledger lacks."""
+    """Return the name of the chunk of a block in an array that has `further` more dimensions than the ledger."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file."""
-    # no CRC: it would be the same for all chunks, because a chunk ends with the CRC of the bytes before it
+    # a chunk ends with the CRC of its earlier bytes, so that a CRC would be the same for all chunks
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
@@ -348,7 +348,7 @@ def with_digest(document: Mapping[str, Any]) -> bytes:
 
 
 def without_digest(line: bytes) -> dict[str, Any] | None:
-    """Return a document without its digest, or None if it is damaged; a missing digest is no damage."""
+    """Return a document without the digest, or None if the document is damaged. A missing digest is no damage."""
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

@@ -1,4 +1,4 @@
-"""Compare a campaign with the store that it resumes or extends, and add new values of axes to the stored ones."""
+"""Compare a campaign with the store to be resumed or extended, and append new values of axes to the stored values."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ log = logging.getLogger("mdr_dask.store")
 
 @dataclass(frozen=True)
 class Stored:
-    """A campaign together with the results that a store already contains."""
+    """A campaign extended by the values of axes that a store already contains."""
 
     # The campaign to lay out. Each axis has first the stored values, then the new values.
     campaign: Campaign
@@ -40,7 +40,7 @@ class Stored:
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
-    """Compare a campaign with the store that it resumes or extends; raise StoreError with a list of all differences."""
+    """Compare a campaign with the store to be resumed or extended; raise StoreError with a list of all differences."""
     attributes(url)  # raises StoreError if this is not a study
     campaign = _with_root(url, campaign)
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
@@ -175,14 +175,14 @@ def _is_file(value: Any) -> bool:
 
 
 def _by_digest(value: Any) -> Any:
-    """Return a value in which each named file, even inside a list, is replaced by its digest."""
+    """Return a value in which the digest of a file replaces the name of the file, even inside a list."""
     if isinstance(value, list):
         return [_by_digest(each) for each in value]
     return value["sha256"] if _is_file(value) else value
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Append the new values of a series to the stored values; also return the positions of all values of the series."""
+    """Append the new values of a series to the stored values. Also return the positions of all values of the series."""
     places = {}
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
@@ -199,9 +199,9 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of each entry (one value of every axis) of a dimension.
+    """Return the position of each entry of a dimension. An entry has one value of every axis along this dimension.
 
-    The keys are the values of the entry as text, and the number of equal entries before the entry.
+    The key of an entry is the text of these values, together with the number of equal entries before the entry.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
@@ -226,7 +226,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return a value of an axis from its stored form; validate lists and mappings."""
+    """Return a value of an axis from the stored form of the value. Lists and mappings are validated."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

@@ -1,4 +1,4 @@
-"""The record of the layout, which holds the digests of all metadata and coordinates, and the check of metadata."""
+"""The record of the layout, and the check of metadata. The record holds the digests of all metadata and coordinates."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 
 from mdr_dask.store.files import RECORD_FOLDER, parsed, read_bytes, with_digest
 
-#: File with the record of the layout. For Zarr it is an empty group; Zarr would warn about any other file.
+#: File with the record of the layout. Zarr reads this file as an empty group. Zarr would warn about any other file.
 RECORD = f"{RECORD_FOLDER}/zarr.json"
-#: Codecs of the arrays of a study. Other codecs are refused, because they might run code.
+#: Codecs of the arrays of a study. Other codecs might run code, and are refused.
 CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}
 
 
@@ -19,8 +19,8 @@ CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}
 class LayoutRecord:
     """The record of the layout of a study."""
 
-    # For each file of the layout, the digests of all its versions, the newest last: a run may be killed after it has
-    # written the record and before it writes the file.
+    # For each file of the layout, the digests of all versions of the file, the newest version last. The file may have
+    # an older version, because a run may be killed between writing the record and writing the file.
     files: Mapping[str, list[str]]
     # The content of the newest ``zarr.json``, for `mdr_dask.store.repair`.
     root: str
@@ -45,7 +45,7 @@ def read_record(url: str) -> LayoutRecord | None:
 
 
 def is_inside(name: str) -> bool:
-    """Return whether a name that a store contains is the name of a file inside this store."""
+    """Return whether a name found in a store refers to a file inside this store."""
     return not name.startswith("/") and ".." not in name.split("/")
 
 

@@ -1,4 +1,4 @@
-"""Lay out a study: create or extend its arrays from templates. The last write makes the new shape visible."""
+"""Lay out a study: create or extend arrays from templates. The last write makes the new shape visible."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from mdr_dask.store.integrity import RECORD, LayoutRecord, read_record
 from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
-#: Number of values in a chunk of a coordinate, so large that nearly every axis has a single chunk.
+#: Number of values in a chunk of a coordinate. With this large number, nearly every axis has a single chunk.
 _COORDINATE_CHUNK = 4096
 #: Names of the attributes that `_series_attributes` returns.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
@@ -48,7 +48,7 @@ _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
 def lay_out(url: str, layout: Sequence[Template]) -> None:
-    """Create the arrays of every template, or extend existing arrays; readers see either the old or the new shape.
+    """Create the arrays of every template, or extend existing arrays. Readers see either the old or the new shape.
 
     Files are written in this order: the record of the layout with the digests of all other files; coordinates and
     metadata of arrays; metadata of groups; finally ``zarr.json``.
@@ -128,7 +128,7 @@ def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return the names that belong to chunks of coordinates, according to the metadata of the study."""
+    """Return those of the given names that the metadata of the study assign to chunks of coordinates."""
     members = root["consolidated_metadata"]["metadata"]
     groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
     data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
@@ -138,7 +138,7 @@ def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]
 
 @dataclass(frozen=True)
 class Finding:
-    """A file that differs from what was written, or that should not exist."""
+    """A file that is damaged (not as it was written), missing, or foreign (not part of the study)."""
 
     # ``damaged``, ``missing`` or ``foreign``.
     kind: str
@@ -157,14 +157,14 @@ def layout_faults(url: str) -> Iterator[Finding]:
     is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
     for name, content in read_many(url, record.files):
         if content is None:
-            if not is_older:  # otherwise a run was stopped before it wrote this file
+            if not is_older:  # an older ``zarr.json``: the run was stopped earlier
                 yield Finding("missing", name, "part of the layout; --repair or the next run writes it again")
         elif digest(content) not in record.files[name]:
             yield Finding("damaged", name, "not what was written")
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment on how to open a study with series, because as one dataset the study looks empty."""
+    """Return a comment on how to open a study with series. Opened as one dataset, such a study looks empty."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"

@@ -21,7 +21,7 @@ from mdr_dask.store.integrity import RECORD
 from mdr_dask.store.layout import layout_faults
 from mdr_dask.store.study import array_of, document
 
-#: Largest number of faults that a message names; `verify` names all of them.
+#: Largest number of faults that a message names. `verify` names all faults.
 NAMED = 3
 
 
@@ -30,7 +30,7 @@ class Blocks:
     """The blocks of a group."""
 
     series: str
-    # Number of blocks along each dimension, and length of a block.
+    # `grid`: number of blocks along each dimension. `lengths`: length of a block along each dimension.
     grid: tuple[int, ...]
     lengths: tuple[int, ...]
     # For each array, beginning with the ledger, the number of dimensions that the ledger lacks.
@@ -61,7 +61,7 @@ class Blocks:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
-    """Return the ledger of a group, cut or padded with "missing" to `shape` if that is given."""
+    """Return the ledger of a group. If `shape` is given, the ledger is cut or padded with "missing" to this shape."""
     metadata = document(url, series)
     if metadata is None:
         if shape is None:
@@ -81,7 +81,7 @@ def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArr
 
 
 def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.int8]:
-    """Read the ledger, and decode equal chunks only once: most chunks are equal, and decoding is slow."""
+    """Read the ledger. Equal chunks are decoded only once, because most chunks are equal and decoding is slow."""
     different: dict[bytes | None, int] = {None: 0}
     names = (blocks.chunk("status", block) for block in blocks.indices)
     numbers = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
@@ -104,7 +104,8 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    The values are not read. If `to_run` is true, missing files of the layout are no fault: the run writes them again.
+    The values are not read. If `to_run` is true, missing files of the layout are no fault, because the run writes
+    missing files again.
     """
     faults = _faults(url, series, to_run)
     if any(faults):  # check again: a run may have changed a file meanwhile
@@ -133,7 +134,7 @@ def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
 
 
 def _has_done(status: NDArray[np.int8], lengths: Sequence[int]) -> NDArray[np.bool_]:
-    """Return which blocks have at least one result that is done."""
+    """Return a mask of the blocks that have at least one result that is done."""
     done = status == Status.DONE
     for axis, length in enumerate(lengths):
         if done.shape[axis]:

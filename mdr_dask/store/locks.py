@@ -1,8 +1,9 @@
 """Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
 If the file system has locks, the operating system releases them when a process ends. On other file systems, and at
-URLs, a run makes a claim: it creates a file, which only one process can do, and regularly writes a second file as a
-sign of life. A run also holds a lock named the gate while it searches for active runs or lays out the study.
+URLs, a run makes a claim. To make a claim, the run creates a file that only one process can create, and then regularly
+writes a second file as a sign of life. A run also holds a lock named the gate while it searches for active runs or lays
+out the study.
 """
 
 from __future__ import annotations
@@ -45,10 +46,11 @@ except ImportError:  # runs then make claims
     fcntl = None  # type: ignore[assignment]
 
 #: `BEAT`: time in s between two signs of life of a run with a claim. `SILENCE`: time in s without a sign of life after
-#: which the run counts as ended; clocks may differ by some seconds.
+#: which the run counts as ended. The clocks of two machines may differ by some seconds.
 BEAT = 10.0
 SILENCE = 60.0
-#: Time in s for which a process tries to acquire a lock, which another process may hold for an instant to check it.
+#: Time in s for which a process tries to acquire a lock. Another process may hold the lock for an instant, to check
+#: whether the lock is held.
 GLANCE = 0.5
 #: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
 #: message is logged.
@@ -67,21 +69,22 @@ log = logging.getLogger("mdr_dask.store")
 class Lock:
     """A lock that a run holds while its tasks write."""
 
-    # Name of the lock; the exclusive lock has an empty name.
+    # Name of the lock. The exclusive lock has an empty name.
     name: str
     # Unique identifier of the run, empty if the run can only read.
     owner: str
-    # Number of the claim; None if the lock is one of the operating system.
+    # Number of the claim. None for a lock of the operating system.
     claim: int | None = None
-    # Whether an earlier run crashed or was killed while it held this lock (for the exclusive lock: any lock).
+    # Whether an earlier run crashed or was killed while holding this lock. For the exclusive lock, while holding any
+    # lock.
     after_crash: bool = False
 
 
 @dataclass(frozen=True, order=True)
 class Part:
-    """One of several disjoint sets of blocks; a separate process computes each set."""
+    """One of several disjoint sets of blocks. A separate process computes each set."""
 
-    # Number of this part, from 1, and number of all parts.
+    # `number`: index of this part, beginning with 1. `count`: how many parts there are.
     number: int
     count: int
 
@@ -157,7 +160,7 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return the name of the process that runs the whole study (None if there is none), and the active parts."""
+    """Return the name of the process that runs the whole study (None without such a process), and the active parts."""
     return (_holder(url) if _is_held(url) else None), _parts(url)
 
 
@@ -209,7 +212,7 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 
 @contextmanager
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
-    """Check that a run still holds its lock; raise StoreBusyError if not, and StoreError if the store can only be read.
+    """Raise StoreBusyError if a run no longer holds the given lock, and StoreError if the store can only be read.
 
     No other run can take over a lock of the operating system until this context ends. A claim is checked only once.
     """
@@ -235,7 +238,7 @@ def while_locked(url: str, lock: Lock) -> Iterator[None]:
 
 
 def _lock_file(url: str, name: str = "") -> Path:
-    """Return the path of a lock file, which lies next to a store on this machine."""
+    """Return the path of a lock file. The file lies next to a store on this machine."""
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
@@ -245,7 +248,7 @@ def _lock_file(url: str, name: str = "") -> Path:
 
 
 def _locked(file: Path) -> int:
-    """Lock a lock file and return its descriptor; create the file again if another process deletes it."""
+    """Lock a lock file and return the descriptor. If another process deletes the file, create the file again."""
     give_up = time.monotonic() + GLANCE
     while True:
         if not file.parent.exists():
@@ -340,9 +343,9 @@ def _runners(url: str, name: str) -> list[Path]:
 
 @contextmanager
 def _registered(url: str, name: str) -> Iterator[Lock]:
-    """Write the runner file, which names the holder of a lock, and remove the runner files of earlier holders.
+    """Write the runner file of a lock, and remove older runner files of the lock. A runner file names the holder.
 
-    While a task writes, it holds a shared lock on the runner file of its run.
+    A task that writes holds a shared lock on the runner file (`while_locked`).
     """
     lock = Lock(name, uuid.uuid4().hex, after_crash=bool(_runners(url, name)))
     _retire(url, name)
@@ -355,7 +358,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Remove the runner files of a lock, after waiting until no task of their runs is writing."""
+    """Wait until no task that needs the runner files of a lock is writing, and remove these files."""
     give_up = time.monotonic() + SILENCE
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
@@ -413,7 +416,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
 
 def _make_claim(url: str, name: str, owner: str) -> int:
-    """Make a claim and return its number; raise StoreBusyError if the owner of the last claim is still active."""
+    """Make a claim and return its number. Raise StoreBusyError if the owner of the last claim is active."""
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
         raise _busy(url, _holder(url, name))
@@ -432,7 +435,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim has recently written a sign of life, or soon writes one."""
+    """Return whether the owner of a claim has recently written a sign of life, or writes a sign of life soon."""
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:
@@ -445,7 +448,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
 
 
 def _read_claim(url: str, name: str) -> dict[str, Any]:
-    """Return the content of a claim or a sign of life, empty if the file is missing or incomplete."""
+    """Return the content of a claim or a sign of life. The content of a missing or incomplete file is empty."""
     try:
         return read_json(url, name) or {}
     except StoreError:

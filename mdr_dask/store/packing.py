@@ -27,7 +27,7 @@ def contents(url: str) -> Iterator[tuple[str, bytes]]:
 
 
 def verify_packed(path: Path) -> Inspection:
-    """Compare every file of a published study with its checksum, and verify the store in it.
+    """Compare every file in the zip of a study with the checksum of the file, and verify the store in the zip.
 
     Raise StoreError if the zip cannot be unpacked, has no checksums, or would unpack to a huge size.
     """

@@ -38,14 +38,14 @@ def readable(url: str) -> Iterator[None]:
 
 
 def is_damage(error: Exception) -> bool:
-    """Return whether an error means that a chunk cannot be read: it comes from Zarr or its codecs."""
+    """Return whether an error comes from Zarr or a codec, and so means that a chunk cannot be read."""
     *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
     package = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
     return not isinstance(error, OSError) and package in ("zarr", "numcodecs")
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:
-    """Open a study for reading, finished or not; return every group by the name of its series.
+    """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
     The values of numeric axes are in ascending order. The results of a study without series have the name ``""``, or
     ``"-"`` if series were added later. Groups larger than `LAZY_BYTES` contain Dask arrays.
@@ -81,18 +81,18 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
 
 def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a copy for netCDF, in which attributes other than texts and numbers are JSON texts."""
+    """Return a copy for netCDF. Attributes that are neither texts nor numbers are JSON texts in the copy."""
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # without it, no run extends the copy
+        if value is not None and name != "mdr_dask_layout"  # no run extends a copy without this attribute
     }
     return plain
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``, lazy arrays piece by piece."""
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``. Lazy arrays are written piece by piece."""
     plain = with_plain_attributes(dataset)
     if path.suffix == ".nc":
         if not (find_spec("h5netcdf") and find_spec("h5py")):

@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-A run writes one file for each block, and from time to time merges many record files into one, because a folder with a
-hundred thousand files would be slow.
+A run writes one record file for each block. From time to time, the run merges many record files into one file, because
+a folder with a hundred thousand files would be slow.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def name_of(series: str, index: BlockIndex, attempt: int) -> str:
 
 
 def decoded(line: bytes) -> dict[str, Any] | None:
-    """Return a record, or None if it is damaged (records of version 0.1 have no digest and count as undamaged)."""
+    """Return a record, or None for a damaged record. Records of version 0.1 have no digest and count as undamaged."""
     record = without_digest(line)
     try:
         return record if record is not None and _is_one(record) else None
@@ -72,7 +72,7 @@ def lines(url: str, series: str) -> Iterator[tuple[str, bytes]]:
 
 
 def records(url: str, series: str) -> Iterator[dict[str, Any]]:
-    """Yield each record of a group once; damaged records are left out."""
+    """Yield each record of a group once. Damaged records are left out."""
     seen: set[tuple[BlockIndex, int]] = set()
     damaged = 0
     for _, line in lines(url, series):
@@ -88,7 +88,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Log a warning of damaged records, again only if their number changes."""
+    """Log a warning about damaged records. The warning is repeated only if the number of damaged records changes."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 

@@ -31,7 +31,8 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     """Return the metadata of a group from ``zarr.json``, or None if the group does not exist.
 
-    The result is cached: do not change it. Raise StoreError if this program did not write the metadata.
+    The returned metadata are cached: do not change the metadata. Raise StoreError if this program did not write the
+    metadata.
     """
     content = read_bytes(url, "zarr.json")
     if content is None:
@@ -45,7 +46,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
-    """Return the metadata of a study, or None if they are unsafe or not in the record of the layout."""
+    """Return the metadata of a study, or None if the metadata are unsafe or not in the record of the layout."""
     root = parsed(content)
     if not isinstance(root, dict) or not isinstance(attributes := root.get("attributes", {}), dict):
         return None
@@ -58,7 +59,7 @@ def _checked(url: str, content: bytes) -> dict[str, Any] | None:
 
 
 def group_of(root: Mapping[str, Any], group: str) -> Mapping[str, Any] | None:
-    """Return the metadata of a group from the metadata of its study, or None if there is no such group."""
+    """Return the metadata of a group from the metadata of the study, or None if there is no such group."""
     if not group:
         return root
     members = root.get("consolidated_metadata", {}).get("metadata", {})
@@ -69,12 +70,12 @@ def group_of(root: Mapping[str, Any], group: str) -> Mapping[str, Any] | None:
 
 
 def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """Return the metadata of the members of a group, by their names inside the group."""
+    """Return the metadata of the members of a group, indexed by the names of the members inside the group."""
     return {name.removeprefix(f"{group}/"): each for name, each in members.items() if name.startswith(f"{group}/")}
 
 
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
-    """Return the Zarr array with the given metadata, which is faster than opening the group."""
+    """Return the Zarr array with the given metadata. This function is faster than opening the group."""
     return zarr.Array(zarr.AsyncArray(dict[str, Any](metadata), StorePath(store, path)))  # type: ignore[call-overload]
 
 
@@ -88,7 +89,7 @@ def refuse_file(url: str, expected: str = "the folder of a store") -> None:
 
 
 def exists(url: str) -> bool:
-    """Return whether there is a study at a path or URL; raise StoreError if there is something else."""
+    """Return whether there is a study at a path or URL; raise StoreError if a file or another folder is there."""
     refuse_file(url, "the folder of a store or nothing")
     path, found = local(url), _root_attributes(url)
     if found is None and path is not None and path.is_dir():
@@ -117,7 +118,7 @@ def only_claimed(found: Mapping[str, Any]) -> bool:
 
 
 def attributes(url: str) -> dict[str, Any]:
-    """Return the attributes of a study; raise StoreError if there is none, or if its layout has a later version."""
+    """Return the attributes of a study; raise StoreError if there is no study, or if the layout has a later version."""
     refuse_file(url)
     found = _root_attributes(url)
     if found is None:

@@ -30,19 +30,20 @@ from mdr_dask.store.study import attributes, document, group_of, refuse_file
 
 #: Ending of temporary files, which do not belong to the study.
 IGNORED = ".partial"
-#: Folder in a published store with the files that do not belong to the study itself.
+#: Folder with the files of a published store that do not belong to the study itself.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
 
 
 @dataclass
 class Group:
-    """A group of a store during verification: its blocks, and the faults that `repair` removes."""
+    """A group of a store during verification: the blocks of the group, and the faults that `repair` removes."""
 
     blocks: Blocks
-    # For each block and each attempt to compute it, the digest of each written chunk by the name of its array.
+    # For each block, and for each attempt to compute the block, the digests of the written chunks by the names of the
+    # arrays.
     attempts: dict[BlockIndex, dict[int, Mapping[str, str]]] = field(default_factory=dict)
-    # Blocks that must be in the ledger, because their records are merged.
+    # Blocks with merged records. The ledger must contain these blocks.
     finished: set[BlockIndex] = field(default_factory=set)
     bad_blocks: set[BlockIndex] = field(default_factory=set)
     bad_records: set[str] = field(default_factory=set)
@@ -63,9 +64,10 @@ class Inspection:
 
 
 def verify(url: str) -> Inspection:
-    """Read every file of a store and compare it with what was written.
+    """Read every file of a store and compare the file with what was written.
 
-    Raise StoreError if there is no store of mdr_dask or it cannot be read, and StoreBusyError if a run is active in it.
+    Raise StoreError if there is no store of mdr_dask or the store cannot be read. Raise StoreBusyError if a run is
+    active in the store.
     """
     refuse_file(url)
     if who := ", ".join(active_runs(url)):
@@ -150,7 +152,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
 
 
 def _check_records(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Find damaged and foreign records, note the digests of the others, and return the names of all record files."""
+    """Find damaged and foreign records, note the digests of good records, and return the names of all record files."""
     series, known = group.blocks.series, set[str]()
     for name, line in lines(url, series):
         known.add(name)
@@ -177,7 +179,7 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
 
 
 def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Compare the chunks of every block with the digests in its records; return the file names of all chunks."""
+    """Compare the chunks of blocks with the digests in the records of these blocks. Return all file names of chunks."""
     blocks, known = group.blocks, set[str]()
     begun = 0
     for block in blocks.indices:
@@ -220,10 +222,10 @@ def _faults(group: Group, block: BlockIndex, contents: Mapping[str, bytes | None
 
 
 def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> set[str]:
-    """Return the digests that the chunk of an array may have; `status` is the digest of the chunk of the ledger.
+    """Return the digests that the chunk of an array may have. `status` is the digest of the chunk of the ledger.
 
     The chunk may come from the last attempt that wrote the array before or together with the chunk of the ledger, or
-    from a later attempt that was killed before it wrote its ledger.
+    from a later attempt that was killed before writing the ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()
@@ -234,7 +236,7 @@ def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> s
 
 
 def _remove_records(url: str, group: Group) -> None:
-    """Remove files with records that are damaged or of damaged blocks; first copy their good records to a new file."""
+    """Remove files with damaged records or records of damaged blocks. First copy the good records to a new file."""
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
     bad |= {name for name, _, record in found if record is None or tuple(record["block"]) in group.bad_blocks}
