@@ -68,7 +68,10 @@ def check(source: Source) -> Summary:
     Summary
         Number of cases and results, size and computing time. ``print`` shows the lines of ``mdr-dask check``.
 
-    Raises ------ CampaignError If the campaign has problems. The error message lists all problems.
+    Raises
+    ------
+    CampaignError
+        If the campaign has problems. The error message lists all problems.
 
     Examples
     --------
@@ -91,12 +94,19 @@ def run(
 
     After an interruption, call `run` again. Finished results are kept.
 
-    Parameters ---------- source : mapping, str, Path or Campaign The campaign, in any form that `read` accepts. store :
-    str or Path, optional Path or URL of the store. The default is the store that the campaign names. If the campaign
-    names no store, results are stored in a temporary folder that is kept until the process ends. progress : bool
-    Whether to show the progress: as a bar in a notebook or on a terminal, otherwise as a line every few seconds.
-    resources : Resources, optional Threads, processes, a scheduler or a cluster; the default is all cores of this
-    machine. retry_failed : bool Whether to compute failed and not converged cases again.
+    Parameters
+    ----------
+    source : mapping, str, Path or Campaign
+        The campaign, in any form that `read` accepts.
+    store : str or Path, optional
+        Path or URL of the store. The default is the store that the campaign names. If the campaign names no
+        store, results are stored in a temporary folder that is kept until the process ends.
+    progress : bool
+        Whether to show the progress: as a bar in a notebook or on a terminal, otherwise as a line every few seconds.
+    resources : Resources, optional
+        Threads, processes, a scheduler or a cluster; the default is all cores of this machine.
+    retry_failed : bool
+        Whether to compute failed and not converged cases again.
 
     Returns
     -------
@@ -104,7 +114,10 @@ def run(
         The study, as returned by `open_study`. Failed results, and questions about numbers without a unit, are shown as
         warnings.
 
-    Raises ------ MdrDaskError If the campaign cannot be run. The message is the message of ``mdr-dask run``.
+    Raises
+    ------
+    MdrDaskError
+        If the campaign cannot be run. ``mdr-dask run`` prints the same message.
 
     Examples
     --------
@@ -128,10 +141,13 @@ def run(
 def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     """Open a study, finished or not.
 
-    Returns ------- Dataset or DataTree The outputs, with units and errors, and ``status``. The dimensions of these
-    arrays are the axes and ``realisation``. A campaign with series gives a DataTree with a node for each series. An
-    array is read when it is first used. The attribute ``complete`` is False as long as results are missing. Means are
-    then taken over the available results.
+    Returns
+    -------
+    Dataset or DataTree
+        The outputs, with units and errors, and ``status``. The dimensions of these arrays are the axes and
+        ``realisation``. A
+        campaign with series gives a DataTree with a node for each series. An array is read when it is first used. The
+        attribute ``complete`` is False as long as results are missing. Means are then taken over the available results.
 
     Raises
     ------
@@ -231,8 +247,11 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
         Table of measured points, used instead of the table of the campaign. Units are in brackets after the column
         names.
 
-    Returns ------- Dataset or DataTree The constants, the limits of the intervals (with ``_low`` and ``_high`` after
-    the name), and ``law_holds``. If series are fitted separately, the result is a DataTree with a node for each series.
+    Returns
+    -------
+    Dataset or DataTree
+        The constants, the limits of the intervals (with ``_low`` and ``_high`` after the name), and ``law_holds``. If
+        series are fitted separately, the result is a DataTree with a node for each series.
 
     Raises
     ------
@@ -331,8 +350,10 @@ def master_curve(
     over, of, by, vertical, reference
         As the options of the command.
 
-    Returns ------- Dataset The shift factors, the merged curve with the error of the curve, and the constants of the
-    laws for the factors.
+    Returns
+    -------
+    Dataset
+        The shift factors, the merged curve with the error of this curve, and the constants of the laws for the factors.
     """
     from pandas import DataFrame
 
