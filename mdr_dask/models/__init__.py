@@ -1,4 +1,4 @@
-"""Find a model by its name. A model is imported only when a campaign names it.
+"""Access to the models by name. A model is imported only when a campaign names it.
 
 Models come from this package, from the entry points of other packages, or from a module of the user.
 """
@@ -33,14 +33,14 @@ GROUP = "mdr_dask.models"
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all installed models: first those of this package, then those of other packages."""
+    """Return the names of all installed models. The names of this package's models come first."""
     return (*NAMES, *(name for name in _installed() if name not in NAMES))
 
 
 def load(name: str) -> Model[Any]:
-    """Return the model called `name`: one of `names`, or ``package.module:NAME``.
+    """Return the model called `name`.
 
-    Raise ModelError if no model has this name.
+    `name` is one of `names()`, or has the form ``package.module:NAME``. Raise ModelError if no model has this name.
     """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
@@ -59,7 +59,7 @@ def is_own(name: str) -> bool:
 
 
 def source_digest(name: str) -> str | None:
-    """Return a digest of the source file of a user's model; blank lines and comments do not count.
+    """Return a digest of the source file of a user's model. Blank lines and comment lines do not change the digest.
 
     Return None for a model of this package, or if the source file cannot be read.
     """
@@ -86,7 +86,7 @@ def _digest(compute: Callable[..., Any]) -> str | None:
     return hashlib.blake2b(code.encode(), digest_size=8).hexdigest()
 
 
-_digest_at_import = lru_cache(_digest)  #: `_own` calls it first, directly after the import
+_digest_at_import = lru_cache(_digest)  #: `_own` makes the first call, directly after the import of the model
 
 
 @lru_cache(maxsize=1)
@@ -116,7 +116,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function of a user's model, changed so that it raises ModelError instead of any other exception."""
+    """Return a function that calls a function of a user's model and converts every exception to a ModelError."""
 
     def call(argument: Any) -> Any:
         try:

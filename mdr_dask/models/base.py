@@ -33,26 +33,26 @@ _WHOLE = re.compile(r"[+-]?\d{1,18}")
 
 
 def unquoted(value: Any) -> Any:
-    """Convert a whole number in quotes to a number; return anything else unchanged."""
+    """Convert a whole number in quotes to a number. Return anything else unchanged."""
     return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
 
 
-#: A whole number. It may be written in quotes, because numbers with a unit are also written in quotes.
+#: A whole number. Quotes around the number are allowed, because numbers with a unit are also written in quotes.
 Whole = Annotated[int, BeforeValidator(unquoted)]
 
 
 class Parameters(BaseModel):
-    """Base class of every parameter set. Quantities are converted to SI units, and their bounds are checked.
+    """Base class of every parameter set. Quantities are converted to SI units and checked against their bounds.
 
     A parameter set cannot be changed, and unknown keys are errors. A subclass may declare:
 
     * `renamed`: earlier names of parameters and outputs, each with a text that says what to write now.
-    * `alternatives`: groups of alternatives; a user gives exactly one of each group. Example of a group:
-    ``(("length", "rms_roughness"), ("profile",))``, if a user gives either `length` together with `rms_roughness`, or
+    * `alternatives`: groups of alternatives. A user gives exactly one alternative of each group. For example, the group
+    ``(("length", "rms_roughness"), ("profile",))`` requires either `length` together with `rms_roughness`, or
     `profile`. A nested parameter is written with dots, such as ``"indenter.radius"``.
-    * `overrides`: for example ``{"history": "cycles"}``, if `cycles` has no effect when `history` is given.
+    * `overrides`: ``{"history": "cycles"}`` means that `cycles` has no effect when `history` is given.
     * `settings`: parameters of the numerical solution that do not change the physical problem, such as a resolution.
-    * `requires`: for example ``{"xi": ("wear_rule", "fast")}``, if `xi` has an effect only with ``wear_rule: fast``.
+    * `requires`: ``{"xi": ("wear_rule", "fast")}`` means that `xi` has an effect only with ``wear_rule: fast``.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -93,14 +93,14 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """Declare a physical parameter, as in ``length: float = quantity("m", "length of the line", gt=0)``.
 
     `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as
-    ``"10 MPa"``, which ``mdr-dask init`` writes into a new campaign file. If a number without a unit differs from
-    `usual` by more than three decades, ``check`` asks the user about it. Further values after commas, as in ``"2 GPa,
-    200 HV"``, show other units in which people write the quantity. The other arguments, such as ``default``, ``gt`` and
-    ``le``, are those of :func:`pydantic.Field`.
+    ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. If a number without a unit differs from
+    `usual` by more than three decades, ``check`` asks the user about this number. Further values after commas, as in
+    ``"2 GPa, 200 HV"``, show other common units of the quantity. The other arguments, such as ``default``, ``gt`` and
+    ``le``, are passed to :func:`pydantic.Field`.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert a text such as ``20 mm`` to SI units by the converter in the context; keep names such as ``auto``."""
+        """Convert a text such as ``20 mm`` to SI units by the converter in the context. Keep names such as ``auto``."""
         if isinstance(value, list | tuple):
             return tuple(to_si(item, info) for item in value)
         value = unquoted(value)
@@ -172,18 +172,18 @@ class Output:
     """One array that a model can compute.
 
     * `unit` and `long_name`: SI unit (``"1"`` for a pure number) and meaning of the output.
-    * `dims`: dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives
-    the coordinates of these dimensions.
+    * `dims`: dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives the
+    coordinates of these dimensions.
     * `default`: whether the output is computed if the campaign names no outputs.
-    * `has_error`: whether the solver estimates the discretisation error. The error is stored as the companion `error`,
-    unless the campaign has ``errors: false``.
+    * `has_error`: whether the solver estimates the discretisation error. The error is stored as a companion, the output
+    ``<name>_error``, unless the campaign has ``errors: false``.
     * `comment`: a limitation of the output, stored as its attribute ``comment``.
-    * `scatter`: name of the output that contains the standard error of this output in a single realisation. If errors
-    are stored, that output is stored, too.
+    * `scatter`: name of a second output, the standard error of this output in a single realisation. If errors are
+    stored, the second output is stored, too.
     * `floor`: a value in the unit of the output, for an output that can be zero. If the absolute value of the output is
-    below `floor`, its relative error is the error divided by `floor`.
-    * `allow_nan`: whether NaN and infinite values are valid. If they are not, a case in which a user's own model
-    returns such a value fails.
+    below `floor`, the relative error is the absolute error divided by `floor`.
+    * `allow_nan`: whether NaN and infinite values are valid. If `allow_nan` is False, a case of a user's own model
+    fails if this output is NaN or infinite.
     """
 
     name: str
@@ -206,10 +206,11 @@ class Output:
 
 @dataclass(frozen=True)
 class Number:
-    """A dimensionless number that is computed for each case. Users can write its name in tables and conditions.
+    """A dimensionless number that is computed for each case.
 
-    The module `mdr_dask.questions.expression` evaluates `formula`. The formula may contain outputs, other numbers and
-    parameters. The name of a nested parameter is its path, joined by ``_``, such as ``indenter_angle``.
+    Users can write the name of the number in tables and conditions. The module `mdr_dask.questions.expression`
+    evaluates `formula`. The formula may contain outputs, other numbers and parameters. In a formula, the nested
+    parameter ``indenter.angle`` is called ``indenter_angle``.
     """
 
     name: str
@@ -228,17 +229,18 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Block(Generic[P]):
-    """Several cases, each with the same realisations. One Dask task computes them and writes one chunk of every array.
+    """Several cases, each with the same realisations.
 
-    * `parameters`: a parameter set with the values of the fixed parameters. In this set, a varied parameter has
-    the value of an arbitrary case; `column` returns the values for all cases.
+    One Dask task computes the block and writes one chunk of every array.
+
+    * `parameters`: a parameter set with the values of the fixed parameters. In this set, a varied parameter has the
+    value of an arbitrary case. The method `column` returns the values for all cases.
     * `columns`: for the dotted path of each varied parameter (such as ``velocity`` or ``indenter.angle``), an array
     with one value in SI units for each case.
-    * `realisations`: indices of the realisations. An index and `seed` determine all random numbers of a
-    realisation.
+    * `realisations`: indices of the realisations. All random numbers of a realisation follow from its index and `seed`.
     * `outputs`: names of the arrays to compute, including the companions that hold errors.
-    * `accuracy`: largest allowed relative discretisation error of every output that has a companion. `Output.floor`
-    defines the relative error of small values.
+    * `accuracy`: largest allowed relative discretisation error of every output with `has_error`. `Output.floor` defines
+    the relative error of small values.
     """
 
     parameters: P
@@ -250,7 +252,7 @@ class Block(Generic[P]):
     accuracy: float | None = None
 
     def column(self, path: str) -> NDArray[Any]:
-        """Return the values of a varied or fixed parameter for all cases; shape (cases,)."""
+        """Return the values of a varied or fixed parameter for all cases, shape (cases,)."""
         if path in self.columns:
             return self.columns[path]
         value: Any = reduce(getattr, path.split("."), self.parameters)
@@ -261,7 +263,7 @@ class Block(Generic[P]):
         return column
 
     def numbers(self, name: str) -> FloatArray:
-        """Return the value of a parameter for every case; NaN for a case in which the parameter is not given."""
+        """Return the value of a parameter for every case, or NaN for a case in which the parameter is not given."""
         given = self.columns.get(name, np.full(self.cases, getattr(self.parameters, name)))
         return np.asarray(given, dtype=np.float64)  # None becomes NaN
 
@@ -291,11 +293,11 @@ def with_value(parameters: Any, path: str, value: Any) -> Any:
 class Result:
     """The return value of a model for a block.
 
-    * `values`: the requested arrays, shape (cases, realisations, ...); NaN where a case failed.
+    * `values`: the requested arrays, shape (cases, realisations, ...). The values of a failed case are NaN.
     * `status`: values of `Status`, shape (cases, realisations).
-    * `messages`: reasons for failures, and warnings about other results. The key is (index of the case, position of the
-    realisation in the block).
-    * `solves`: number of solutions computed; several cases may share one solution.
+    * `messages`: reasons for failures, and warnings about results. The key is (index of the case, position of the
+    realisation in `Block.realisations`).
+    * `solves`: number of computed solutions. Several cases may share one solution.
     """
 
     values: dict[str, FloatArray]
@@ -304,7 +306,7 @@ class Result:
     solves: int = 0
 
     def add_message(self, case: int, realisation: int, message: str) -> None:
-        """Append a message to the messages of a case; `realisation` is the position of the realisation in the block."""
+        """Append a message to the messages of a case. `realisation` is the position of the realisation in the block."""
         before = self.messages.get((case, realisation))
         self.messages[case, realisation] = f"{before}; {message}" if before else message
 
@@ -314,24 +316,25 @@ class Model(Generic[P]):
     """A computation that a campaign can name.
 
     * `version`: a number that is raised when a change of the code changes results. A store can be extended only by the
-    version that created it.
+    model version that created the store.
     * `summary`: one line for ``mdr-dask models``.
     * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
-    * `compute`: a pure function. The outputs of a case depend on its parameters, the seed and its realisation, but
-    not on the other cases of the block. The function raises no exception for a case that fails.
-    * `operations`: approximate number of floating-point operations of a block, from which block sizes are chosen. The
-    function must be fast. If `operations` is None, a study with n results is divided into about sqrt(n) blocks.
-    * `whole`: parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
-    becomes too large, the axis of the last of these parameters is divided first.
+    * `compute`: a pure function. The outputs of a case depend on the parameters of the case, the seed and the
+    realisation, but not on the other cases of the block. If a case fails, the function raises no exception.
+    * `operations`: approximate number of floating-point operations of a block. Block sizes are chosen by means of this
+    number. The function must be fast. If `operations` is None, a study with n results is divided into about sqrt(n)
+    blocks.
+    * `whole`: parameters whose axes are not divided among blocks, because the cases along such an axis share work. If a
+    block becomes too large, the axis of the last parameter in `whole` is divided first.
     * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
-    * `least`: smallest possible value of coordinates, such as 0 for a radius.
-    * `distinct`: number of different solutions among the cases of a block, for ``check``; by default the number of
-    cases.
+    * `least`: smallest possible values of coordinates, such as 0 for a radius.
+    * `distinct`: number of solutions of a block, for ``check``. Equal cases share one solution. If `distinct` is None,
+    every case counts as one solution.
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
     campaign.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
-    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets of the study, in
-    which one axis at a time is varied. A nested parameter set can have its own method `notes`.
+    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets of the study. One axis at
+    a time is varied to make these sets. A nested parameter set can have its own method `notes`.
     """
 
     name: str
@@ -352,15 +355,21 @@ class Model(Generic[P]):
 
     @property
     def companions(self) -> dict[str, Output]:
-        """The companions that hold the errors. The key is the name of the output, not of the companion."""
+        """The companion of every output that has an error.
+
+        The keys are the names of the outputs, not of the companions.
+        """
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
-        """Return the output or the companion that is called `name`; raise KeyError if there is none."""
+        """Return the output or the companion that is called `name`. Raise KeyError if there is none."""
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return `names` and the names of their `scatter` outputs, each followed by its companion if it has one."""
+        """Return `names` and the names of their `scatter` outputs.
+
+        Each name is followed by the name of its companion, if any.
+        """
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}
         kept = [output.name for output in self.outputs if output.name in asked]

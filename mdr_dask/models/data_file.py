@@ -15,7 +15,7 @@ from mdr_dask.errors import DataError, similar
 from mdr_dask.models.base import Parameters
 from mdr_dask.tables import decoded, described
 
-#: Size limit in bytes: `DataFile.notes` describes the columns of smaller files only.
+#: `DataFile.notes` describes the columns of a file only if the file is smaller than this size in bytes.
 LARGEST_TABLE = 10**7
 
 
@@ -33,31 +33,31 @@ class DataFile(BaseModel):
         return cls(name=path.name, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
     def read_bytes(self) -> bytes:
-        """Return the content of the file; raise DataError if it has changed since the campaign was read."""
+        """Return the content of the file. Raise DataError if the file has changed since the campaign was read."""
         content = Path(self.path).read_bytes()
         if hashlib.sha256(content).hexdigest() != self.sha256:
             raise DataError(f"{self.path}: changed since the campaign was read")
         return content
 
     def read_text(self) -> str:
-        """Return the text of the file; raise DataError if the file has changed or is not text."""
+        """Return the text of the file. Raise DataError if the file has changed or is not text."""
         return decoded(self.read_bytes(), self.path)
 
     @contextmanager
     def in_errors(self) -> Iterator[None]:
-        """Put the name of the file before the message of any DataError that a ``with`` statement raises."""
+        """Put the name of the file before the message of any DataError that is raised inside the ``with`` statement."""
         try:
             yield
         except DataError as problem:
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note on the columns of a table and their ranges; for other files, return no note."""
+        """Return a note with the columns of a table and the range of each column. Return no note for other files."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """Call `check` if a campaign is being read; convert a DataError to the ValueError that pydantic expects."""
+    """If a campaign is being read, call `check` and convert a DataError to the ValueError that pydantic expects."""
     if info.context is not None:
         try:
             check()
@@ -92,7 +92,7 @@ NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_ty
 class NamedByFile(Parameters):
     """A parameter set with a field `file` or `files`.
 
-    In place of the whole parameter set, a user may write only the name of the file; all other fields then have their
+    In place of the whole parameter set, a user may write only the name of the file. All other fields then have their
     default values.
     """
 

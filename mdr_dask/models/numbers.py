@@ -1,4 +1,4 @@
-"""List parameters of a case under the names that they have in a store."""
+"""Parameters of a case, under the names that the parameters have in a store."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
-    """Return the value, unit and meaning of each parameter that is a number, unless another parameter overrides it.
+    """Return the value, unit and meaning of each parameter that is a number.
 
-    The name of a nested parameter is its path, joined by ``_``, such as ``indenter_angle``.
+    Parameters that another parameter overrides are left out. The nested parameter ``indenter.angle`` is called
+    ``indenter_angle``.
     """
     found: dict[str, tuple[float, str, str]] = {}
     idle = parameters.inactive if isinstance(parameters, Parameters) else {}
@@ -30,7 +31,7 @@ def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float
 
 
 def least_of(name: str) -> dict[str, float]:
-    """Return the lower bound of each parameter and coordinate of a model; empty if the model cannot be loaded."""
+    """Return the lower bounds of the parameters and coordinates of a model, or {} if the model cannot be loaded."""
     try:
         model = models.load(name)
     except ModelError:
@@ -41,9 +42,9 @@ def least_of(name: str) -> dict[str, float]:
 
 
 def entries_of(axis: Mapping[str, Any]) -> dict[tuple[str, ...], list[Any]]:
-    """Return the parameters inside the values of a stored axis, such as the radius along an axis of indenters.
+    """Return the parameters inside the values of a stored axis, such as the radius of each indenter on an axis.
 
-    The key is the path of a parameter in the campaign; a value of the axis without this parameter has the entry None.
+    The key is the path of a parameter in the campaign. If a value of the axis lacks this parameter, its entry is None.
     """
     path = tuple(axis["path"].split("."))
     each = [dict(_leaves(value, path)) if isinstance(value, dict) else {} for value in axis["values"]]

@@ -1,4 +1,4 @@
-"""Make the function `compute` of a model from a function that solves one case."""
+"""The function `compute` of a model, made from a function that solves one case."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import random_stream
 from mdr_dask.models.base import Block, Result, Status
 
-#: Time in s after which a case raises TimeoutError; None for no limit. The limit applies only in a process that handles
-#: the alarm signal.
+#: Time in s after which a case raises TimeoutError, or None for no limit. The limit applies only in a process that
+#: handles the alarm signal.
 time_limit: float | None = None
 
 #: Folder of the package mdr_dask.
@@ -32,8 +32,8 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     """Return a function for ``Model(compute=...)`` that solves the cases of a block one after another.
 
     `solve` receives the parameters of one case in SI units and a random generator. All cases of a realisation get the
-    same random numbers. `solve` returns a value for each output, by name. If an output has an error, `solve` also
-    returns this error, as ``<output>_error``.
+    same random numbers. `solve` returns a mapping from the name of each output to its value. If an output has an error,
+    `solve` also returns this error, as ``<output>_error``.
 
     A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
     real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A case also fails if an
@@ -79,7 +79,7 @@ def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Return whether an exception comes from Ctrl-C, which only the main thread receives."""
+    """Return whether an exception comes from Ctrl-C. Only the main thread receives Ctrl-C."""
     is_main = threading.current_thread() is threading.main_thread()
     return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 

@@ -1,4 +1,7 @@
-"""Parameters and outputs of the model `ehl_line`. This module does not import the solver, so it loads quickly."""
+"""Parameters and outputs of the model `ehl_line`.
+
+This module does not import the solver, so the module loads quickly.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output
 from mdr_dask.physics.lubrication.film_formulas import STEEL
 
 #: Each row contains a dimensionless number, the dimensional quantity that a user can give instead, and the other
-#: parameters that are then also required. For example, `line_load` with `radius` replaces `load_parameter`.
+#: parameters that the dimensional quantity needs. For example, `line_load` with `radius` replaces `load_parameter`.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -25,8 +28,8 @@ _PAIRS = (
 class EhlLineParameters(Parameters):
     """A lubricated line contact.
 
-    A user gives the load, the speed and the material each as a dimensionless number (W, U or G) or as a quantity with
-    a unit.
+    For the load, the speed and the material, a user gives either the dimensionless number (W, U or G) or a quantity
+    with a unit.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -185,8 +188,8 @@ OUTPUTS = (
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     """Return the dimensionless parameters W (load), U (speed) and G (material).
 
-    W, U and G are computed if the user does not give them. ``lookup(name)`` returns the values of the parameter `name`,
-    or None if the user does not give it.
+    If the user does not give W, U or G, the missing number is computed from quantities with units. ``lookup(name)``
+    returns the values of the parameter `name`, or None if the user does not give this parameter.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")
@@ -200,7 +203,7 @@ def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
 
 
 def positions(parameters: EhlLineParameters) -> FloatArray:
-    """Return the positions at which film and pressure are stored, in half widths of the contact."""
+    """Return the positions at which film and pressure are stored, divided by the half width of the contact."""
     return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
 
 

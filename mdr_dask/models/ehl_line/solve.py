@@ -1,4 +1,4 @@
-"""Solve a block of cases: lubricated line contacts."""
+"""Solution of a block of lubricated line contacts."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Outputs that are positions x/a. The relative error of a position is its error divided by 1 or by the absolute value
-#: of x/a, whichever is larger.
+#: Outputs that are positions x/a. The relative error of a position is the error of x/a, divided by the absolute value
+#: of x/a. If this absolute value is below 1, the error is not divided.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 
@@ -91,7 +91,7 @@ def highest_pressure(contact_modulus: float, W: float) -> float:
 def _estimates(
     case: EhlLineParameters, W: float, solution: LineSolution, outputs: Collection[str]
 ) -> dict[str, Estimate]:
-    """Return the requested outputs of a solution and their errors, in the units of the outputs."""
+    """Return the requested outputs of a solution, and the errors, both in the units of the outputs."""
     film, p0 = square_of_half_width(W), highest_pressure(case.contact_modulus, W)
     metres = film * (np.nan if case.radius is None else case.radius)
     place, readings = positions(case), _readings(case, W, solution.case)
@@ -175,19 +175,20 @@ def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[floa
 
 
 def distinct(block: Block[EhlLineParameters]) -> int:
-    """Return the number of different solutions among the cases of a block."""
+    """Return the number of solutions of a block. Equal cases share one solution."""
     return len(set(_line_contacts(block)))
 
 
 def operations(block: Block[EhlLineParameters]) -> float:
-    """Return the approximate number of operations of a block: the entries of the matrices of all Newton steps.
+    """Return the approximate number of operations of a block.
 
-    If a campaign with an accuracy requests the pressure or its spike, a solution needs the finest grid.
+    The number counts the matrix entries in all Newton steps. If a campaign with an accuracy requests the pressure or
+    the pressure spike, a solution needs the finest grid.
     """
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
     return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * distinct(block)
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory in bytes of a solution on the finest grid: about three matrices of floating-point numbers."""
+    """Return the memory in bytes of a solution on the finest grid: three matrices of floating-point numbers."""
     return 3.0 * 8 * (NODES[-1] + 1) ** 2

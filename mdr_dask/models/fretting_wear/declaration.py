@@ -45,7 +45,7 @@ class Power(indenter.Power):
 
 
 class Table(Parameters):
-    """A measured profile in a table. Its columns are radius and height, each with its unit."""
+    """A measured profile in a table with the columns radius and height. Each column has a unit."""
 
     shape: Literal["table"]
     file: NamedFile = Field(description="table with the columns radius and height, each with its unit")
@@ -70,7 +70,7 @@ class Table(Parameters):
 
 
 def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray, int]:
-    """Return radii and heights of a measured profile, in metres, and the number of rows without a number."""
+    """Return radii and heights of a measured profile, in metres, and the number of incomplete rows."""
     columns = Column("radius", "m", least=0.0), Column("height", "m", ("f",))
     table = read_table(file.read_text(), file.name, columns, allow_missing=True)
     known = np.isfinite(table["radius"]) & np.isfinite(table["height"])
@@ -101,7 +101,7 @@ class LoadStep(Parameters):
 #: Message if the fast rule is requested under constant force.
 FAST_AT_DEPTH = "wear_rule fast is for constant depth only: write wear_rule: exact for hold: force"
 _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
-#: Parameters of the rate of wear, on which the limiting profile does not depend.
+#: Parameters of the rate of wear. The limiting profile does not depend on these parameters.
 _OF_RATE = ("hardness", "wear_coefficient")
 
 
@@ -336,7 +336,10 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units that differ from the declared units: ``"1"`` for path and outputs of dimensionless campaigns."""
+    """Return the units that differ from the declared units.
+
+    In a dimensionless campaign, the parameter `path` and all outputs have the unit ``"1"``.
+    """
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 

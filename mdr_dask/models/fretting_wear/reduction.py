@@ -1,4 +1,4 @@
-"""Convert the parameters of a block to dimensionless numbers for every case and realisation."""
+"""Conversion of the parameters of a block to dimensionless numbers for every case and realisation."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Numbers:
-    """The dimensionless numbers and the units of every case in every realisation; shape (cases, realisations).
+    """The dimensionless numbers and the units of every case in every realisation, shape (cases, realisations).
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
-    stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
-    in sliding wear; it is 0 in the limit, which does not depend on it. `advance` is N divided by the parameter
-    `cycles`, or the dimensionless path divided by the parameter `path`. `length`, `height` and `force` are the units
-    a0, d0 and E* d0 a0.
+    stick border. In sliding wear, `level` is 0. `cycles` is the dimensionless number of cycles N, or in sliding wear
+    the dimensionless sliding distance. With ``wear_rule: limit``, `cycles` is 0, because the limiting profile does not
+    depend on N. `advance` is N divided by the parameter `cycles`, or the dimensionless sliding distance divided by the
+    parameter `path`. `length`, `height` and `force` are the units a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray
@@ -42,7 +42,7 @@ class Numbers:
 
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
-    """Return a list of indenters: one for every case, or a single one for all cases.
+    """Return a list with one indenter for every case, or with a single indenter for all cases.
 
     The list has a single element if all cases have the same indenter, or if only parameters of a power law vary, such
     as the angle of a cone.
@@ -53,7 +53,7 @@ def indenters(block: Block[FrettingWear]) -> list[Indenter]:
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of the body of every case; both are NaN if the body is not a power law."""
+    """Return coefficient and exponent of the power-law body of every case. Both numbers are NaN for any other body."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Pressed) else one.power_law() for one in indenters(block)]
@@ -86,7 +86,7 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
     """Return log-normal factors of mean 1, shape (cases, realisations).
 
-    Their standard deviation is the value of the parameter `name`.
+    The standard deviation of the factors is the value of the parameter `name`.
     """
     width = np.sqrt(np.log1p(block.numbers(name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
@@ -148,7 +148,7 @@ def _first_contact(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the contact radius a0 and the indentation depth d0 before wear, for every case.
 
-    Add a message for every case without a result, for example if its table ends at a radius below a0.
+    Add a message for every case in which a0 cannot be computed, for example because a table ends at a radius below a0.
     """
     from mdr_dask.physics.mdr import power_law_contact as contact
 
@@ -168,7 +168,7 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Return the contact before wear at an indentation depth, for a body that is not a power law."""
+    """Return the contact before wear at an indentation depth. Raise ValueError if the body is a power law."""
     if not isinstance(indenter, Pressed):
         raise ValueError("power laws and other profiles cannot be mixed along one axis")
     return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)
@@ -189,7 +189,10 @@ def _pressed_body(indenter: RoundedCone, depth: float) -> TableProfile:
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:
-    """Add a message for every case of gross slip; gross slip is allowed only in histories and along a sliding path."""
+    """Add a message for every case of gross slip.
+
+    Gross slip is allowed only in load histories and in sliding wear.
+    """
     if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
         return
     for case, realisation in np.argwhere(~(numbers.level > 0.0)):

@@ -1,7 +1,7 @@
-"""Solve a block of cases: fretting wear.
+"""Solution of a block of cases of fretting wear.
 
-With the exact rule and no load history, cases with the same body and stick radius share one solution, which gives the
-results at all numbers of cycles.
+With the exact rule and no load history, cases with the same body and stick radius share one solution. This solution
+gives the results at all numbers of cycles.
 """
 
 from __future__ import annotations
@@ -33,13 +33,15 @@ from mdr_dask.physics.wear.worn import Worn, virgin_load
 
 #: Quantities that can be computed in closed form, for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Outputs that have another name in `Worn`, each with its name there. The output `contact_force` cannot be called
+#: For each output that has another name in `Worn`, the name in `Worn`. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Tolerance of a solution if the campaign states no accuracy, and the smallest tolerance: error of the worn profile,
-#: divided by eta d0.
+#: Two tolerances for the error of the worn profile, divided by eta d0: the tolerance if the campaign states no
+#: accuracy, and the smallest tolerance of any solution.
 _USUAL, _FINEST = 1e-3, 1e-5
-_FINER = 0.25  # tolerance of the first solution over the accuracy, and of a further solution over the tolerance before
+#: The tolerance of the first solution is this factor times the accuracy. If the first solution misses the accuracy,
+#: the tolerance of each further solution is this factor times the tolerance of the solution before.
+_FINER = 0.25
 
 #: Indices (case, realisation) in a block.
 Places = list[tuple[int, int]]
@@ -47,9 +49,9 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """All data of a case except N and the factor xi of the fast rule. Several cases can have the same task.
+    """All data of a case except the number of cycles N and the factor xi of the fast rule.
 
-    `extent` is the last radius of the profiles, divided by a0.
+    Several cases can have the same task. `extent` is the last radius of the profiles, divided by a0.
     """
 
     table: Pressed | None
@@ -82,7 +84,7 @@ def compute(block: Block[FrettingWear]) -> Result:
 
 
 def distinct(block: Block[FrettingWear]) -> int:
-    """Return the number of different solutions of a block, as `compute` counts them."""
+    """Return the number of solutions that `compute` needs for a block."""
     numbers, _, status = _reduced(block)
     if _is_plain(block):
         return _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
@@ -95,7 +97,7 @@ def operations(block: Block[FrettingWear]) -> float:
     if _is_plain(block):
         return 1e4 * size  # about ten integrals with 64 nodes
     if parameters.history:
-        return 120.0 * parameters.cells**3 * size  # 12 n^2 in each of about 10 n steps on n cells
+        return 120.0 * parameters.cells**3 * size  # 12 n^2 operations in each of about 10 n steps, for n cells
     numbers, _ = reduce_block(block)
     of_profiles = 1e4 * parameters.points  # integrals over about 20 pieces with 24 nodes
     total = 0.0
@@ -122,7 +124,7 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the quantity of `Worn` to which the output `name` belongs, and whether the output is its error."""
+    """Return the quantity of `Worn` for the output `name`, and whether the output is the error of this quantity."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
@@ -135,7 +137,10 @@ def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
 
 
 def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
-    """Multiply outputs by the units of length, height and force of each case; units are 1 in dimensionless cases."""
+    """Multiply outputs by the units of length, height and force of each case.
+
+    In a dimensionless campaign, the units are 1.
+    """
     units = {
         "contact_radius": numbers.length,
         "stick_border": numbers.length,
@@ -172,7 +177,7 @@ def _solve_plain(
 ) -> int:
     """Compute all cases of a block together, by the closed forms of the limiting profile or of the fast rule.
 
-    Return the number of different cases, each of which is computed once.
+    Return the number of distinct cases. Each distinct case is computed only once.
     """
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
@@ -192,7 +197,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the different columns of an array, and for every column its index among the different columns."""
+    """Return the distinct columns of an array, and for every column its index among the distinct columns."""
     columns, back = np.unique(rows, axis=1, return_inverse=True)
     return columns, back.ravel()
 
@@ -208,7 +213,7 @@ def _solve_each(
     status: NDArray[np.int8],
     messages: dict[tuple[int, int], str],
 ) -> int:
-    """Solve each task for all its numbers of cycles; return the number of solutions."""
+    """Solve each task for all its pairs (N, xi) and write the results. Return the number of solutions."""
     solves = 0
     for task, wanted in _tasks(block, numbers, status).items():
         places = np.linspace(0.0, task.extent, block.parameters.points)
@@ -231,7 +236,7 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution. An output ``block_...`` has one row for each block of a history."""
+    """Return one output of a solution. An output ``block_...`` has one row for each block of the load history."""
     plain, is_error = _plain_name(name)
     answers = [
         one.error(plain, places) if is_error else one.value(plain, places)
@@ -241,7 +246,7 @@ def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | F
 
 
 def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float) -> str:
-    """Return a message if a requested profile ends inside the wear scar; otherwise return an empty string."""
+    """Return a message if a requested profile ends inside the wear scar, or else an empty string."""
     widest = max(one.contact_radius for one in records)
     if widest <= extent or not any({"radius", "position"} & {*MODEL.output(name).dims} for name in block.outputs):
         return ""
@@ -252,7 +257,7 @@ def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float)
 
 
 def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatArray) -> str:
-    """Return a message about the outputs that miss the accuracy, or an empty string if no output misses it."""
+    """Return a message about the outputs that miss the accuracy, or an empty string if there are no such outputs."""
     if block.accuracy is None:
         return ""
 
@@ -267,7 +272,7 @@ def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatAr
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
-    """Return the number of solutions of a task: 1 if one solution gives all results, otherwise 1 for each (N, xi)."""
+    """Return the number of solutions of a task: 1, or the number of pairs (N, xi) if each pair needs a solution."""
     marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
     return 1 if marched or task.rule == "limit" else len(wanted)
 
@@ -275,7 +280,7 @@ def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
 def _tasks(
     block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
 ) -> dict[Task, dict[tuple[float, float], Places]]:
-    """Return each task with its pairs (N, xi), and each pair with the indices (case, realisation) of its results."""
+    """Return, for every task and every pair (N, xi) of the task, the indices (case, realisation) of the results."""
     tasks: dict[Task, dict[tuple[float, float], Places]] = {}
     bodies = indenters(block)
     for case in range(block.cases):
@@ -322,10 +327,12 @@ def _first_resolution(accuracy: float | None) -> float:
 def _contacts(
     task: Task, wanted: Sequence[tuple[float, float]], block: Block[FrettingWear], places: FloatArray
 ) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its pairs (N, xi); return the contacts, each with a message if outputs miss the accuracy.
+    """Solve a task for the pairs (N, xi) in `wanted`.
 
-    A pair that misses the accuracy is solved again at a finer resolution. The final resolution of a result depends only
-    on its own case.
+    Return, for every pair, the contacts and a message. The message is empty unless outputs miss the accuracy.
+
+    A pair that misses the accuracy is solved again at a finer resolution. The final resolution of a pair does not
+    depend on the other pairs.
     """
     resolution, left = _first_resolution(block.accuracy), list(range(len(wanted)))
     errors = block.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
@@ -343,7 +350,10 @@ def _contacts(
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Return contacts for every pair (N, xi): one for each block of a load history, or one if there is no history."""
+    """Return the contacts for every pair (N, xi).
+
+    There is one contact for each block of a load history, or a single contact without a history.
+    """
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)
@@ -358,7 +368,7 @@ def _solved(
 
 
 def _loaded(task: Task, profile: Profile, *, errors: bool) -> list[Worn]:
-    """Return the contact after each block of a history."""
+    """Return the contact after each block of a load history."""
     first = 2.0 * virgin_load(profile, 1.0)
     blocks = [
         LoadBlock(

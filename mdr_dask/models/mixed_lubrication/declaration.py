@@ -25,13 +25,17 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 from mdr_dask.units import shown_apart
 
 Positive = Annotated[float, Field(gt=0)]
-WAVES = 100_000  # default ratio of the circumference of a roller to the shortest wavelength
+#: Circumference of a roller divided by the shortest wavelength, for `shortest_wavelength: auto` with `points: auto`.
+WAVES = 100_000
 #: Positions at which the profiles are stored, divided by the half width of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
 
 class MixedLubrication(Parameters):
-    """Two equal rough rollers with an oil film between them; the defaults describe the twin-disc rig of the thesis."""
+    """Two equal rough rollers with an oil film between them.
+
+    The default values describe the twin-disc rig of the thesis.
+    """
 
     renamed: ClassVar[Mapping[str, str]] = {
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
@@ -175,7 +179,7 @@ class MixedLubrication(Parameters):
         return self.roller_radius / 2
 
     def source(self) -> Source:
-        """Return the object that makes the rough lines. Cases whose objects are equal have the same lines."""
+        """Return the object that makes the rough lines of the case. Cases with equal objects have the same lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
@@ -244,7 +248,7 @@ class MixedLubrication(Parameters):
 
 
 def notes(sets: Sequence[MixedLubrication]) -> tuple[str, ...]:
-    """Return notes on measured lines, and on a longest wavelength that exceeds the contact width under every force."""
+    """Return notes on measured lines, and a note if the longest wavelength exceeds the largest contact width."""
     pairs = dict.fromkeys(one.source() for one in sets)
     lines = tuple(pair.note() for pair in pairs if isinstance(pair, Measured))
     longest = max(one.longest() for one in sets)
@@ -333,7 +337,7 @@ DRAWN = {output.name for output in OUTPUTS if output.dims}
 
 
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
-    """Return the coordinates of the outputs: rolling angles, and positions in half widths of the contact."""
+    """Return the coordinates of the outputs: rolling angles, and positions divided by the half width of the contact."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
     return {
         "angle": Coordinate(angles, "rad", "rolling angle"),

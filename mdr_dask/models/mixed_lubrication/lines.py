@@ -15,11 +15,11 @@ from mdr_dask.units import shown
 
 MOST_POINTS = 10**7  # largest number of points of a line, limited by memory
 LEAST_PER_WAVE = 2.5  # points per shortest wavelength on the coarsest grid for `points: auto`; 2 is the minimum
-DOUBLINGS = 3  # largest number of finer grids for `points: auto`
+DOUBLINGS = 3  # largest number of grids that are finer than the coarsest grid, for `points: auto`
 
 
 def points_for(modes: int) -> tuple[int, ...]:
-    """Return the number of points of each grid, from coarse to fine; `modes` is the number of waves of a line."""
+    """Return the number of points of each grid, from coarse to fine. `modes` is the number of waves of a line."""
     from scipy.fft import next_fast_len
 
     least = next_fast_len(min(int(np.ceil(LEAST_PER_WAVE * modes)), MOST_POINTS), real=True)
@@ -30,7 +30,7 @@ def points_for(modes: int) -> tuple[int, ...]:
 class _Random:
     """Base class of pairs of rough lines with random phases.
 
-    `points` is the number of points of each grid, from coarse to fine; the lines have the same waves on every grid.
+    `points` is the number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
     `longest` is the circumference of a roller divided by the longest wavelength, and `modes` is the circumference
     divided by the shortest wavelength.
     """
@@ -40,11 +40,11 @@ class _Random:
     modes: int
 
     def length(self, perimeter: float) -> float:
-        """Return the length of the lines in m: the circumference `perimeter` of a roller."""
+        """Return the length of a line in m, which is the circumference `perimeter` of a roller."""
         return perimeter
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why these lines are impossible, or an empty string if they are possible."""
+        """Return the reason why the lines cannot be made, or an empty string."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
@@ -60,8 +60,8 @@ class _Random:
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).
 
-        For each wavelength, from the longest to the shortest, one random phase is drawn for each line, so that longer
-        waves stay the same if shorter waves are added.
+        The random phases are drawn in the order of the wavelengths, beginning with the longest wavelength. Longer waves
+        therefore stay the same if shorter waves are added.
         """
         from mdr_dask.physics.surfaces.roughness import phase_factors
         from mdr_dask.physics.surfaces.splines import closest
@@ -91,14 +91,14 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines, in m, with the spectra of measured surfaces; realisations use the files of a surface in turn."""
+    """Two lines with the spectra of measured surfaces, in m. The realisations use the files of a surface in turn."""
 
     surface_1: Surface
     surface_2: Surface
     perimeter: float
 
     def combined_rms(self) -> float:
-        """Return the rms height in m of the sum of the two lines; mean squares are averaged over all files."""
+        """Return the rms height in m of the sum of the two lines. Mean squares are averaged over all files."""
         squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
         return float(np.sqrt(sum(squares)))
 
@@ -108,7 +108,7 @@ class OfSurfaces(_Random):
         return first, second
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why these lines are impossible, or an empty string if they are possible."""
+        """Return the reason why the lines cannot be made, or an empty string."""
         flat = "expected roughness of both surfaces between longest_wavelength and shortest_wavelength, got none"
         return super().problem(perimeter) or (
             "" if all(np.any(line) for both in self._both() for line in both) else flat
@@ -127,16 +127,19 @@ class OfSurfaces(_Random):
 class Measured:
     """Two measured lines. The end of each line is joined to its beginning.
 
-    If their spacings differ, the coarser line is interpolated to the spacing of the finer one.
+    If the spacings of the two lines differ, the line with the larger spacing is interpolated to the smaller spacing.
     """
 
     file_1: ProfileFile
     file_2: ProfileFile
-    scaled: bool  # whether the lines are scaled to the rms height 1
+    scaled: bool  # whether each line is scaled to the rms height 1
 
     @property
     def points(self) -> tuple[int, int]:
-        """Numbers of points on the coarse and the fine grid. Both lines are cut to the same even number of points."""
+        """Number of points of the coarse grid and of the fine grid.
+
+        Both lines are cut to the same even number of points.
+        """
         half = min(height.size for height in self._heights()) // 2
         return half, 2 * half
 
@@ -147,15 +150,15 @@ class Measured:
         return one if _are_equal(one, two) else min(one, two)
 
     def length(self, _: float) -> float:
-        """Return the length of the lines in m; it does not depend on the perimeter of the rollers."""
+        """Return the length of the lines in m. This length does not depend on the circumference of the rollers."""
         return self.points[-1] * self.spacing
 
     def problem(self, _: float) -> str:
-        """Return an empty string: any two measured lines can be combined."""
+        """Return an empty string, because any two measured lines can be combined."""
         return ""
 
     def note(self) -> str:
-        """Return a description of the two lines as they are used, with their rms heights before any scaling."""
+        """Return a text with the number of points, the length and the rms heights of the lines before any scaling."""
         first, second = (shown(float(line.std()), "m") for line in self._levelled())
         return (
             f"both profiles are used without tilt, with {self.points[-1]} points over {shown(self.length(0.0), 'm')}; "
@@ -163,7 +166,7 @@ class Measured:
         )
 
     def combined_rms(self) -> float:
-        """Return the rms height of the sum of the two lines, in m; it is dimensionless if the lines are scaled."""
+        """Return the rms height of the sum of the two lines, in m, or without a unit if the lines are scaled."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
@@ -181,12 +184,12 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines of equal length, scaled to the rms height 1 if `scaled` is true."""
+        """Return the two lines without mean and tilt. If `scaled` is True, each line is scaled to the rms height 1."""
         first, second = (line / line.std() if self.scaled else line for line in self._levelled())
         return first, second
 
     def _levelled(self) -> list[FloatArray]:
-        """Return the lines without mean and tilt, so that the two ends of a line meet without a large step."""
+        """Return the lines without mean and tilt. The two ends of a line then meet without a large step."""
         from mdr_dask.physics.surfaces.measured import detrended
 
         return [detrended(height[: self.points[-1]], "line") for height in self._heights()]
@@ -201,7 +204,7 @@ def _are_equal(one: float, two: float) -> bool:
 
 @lru_cache(maxsize=16)
 def _heights_at(file: ProfileFile, spacing: float) -> FloatArray:
-    """Return the heights of a measured line, interpolated by a cubic spline if the line has another spacing."""
+    """Return the heights of a measured line at points with the distance `spacing`, interpolated if necessary."""
     from scipy.interpolate import CubicSpline
 
     line = line_of(file)

@@ -21,7 +21,7 @@ _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
 
 
 class OilData(Parameters):
-    """An oil, given by the numbers of its data sheet or by a table of viscosities."""
+    """An oil, given by the numbers of a data sheet or by a table of viscosities."""
 
     alternatives: ClassVar[tuple[Alternatives, ...]] = ((_TWO, ("viscosities",)),)
     temperature_1: float | None = quantity(
@@ -81,7 +81,7 @@ class OilData(Parameters):
     def two_viscosities(self) -> tuple[float, float, float, float]:
         """Two temperatures in K, each followed by the kinematic viscosity in m^2/s at this temperature.
 
-        The user gives these viscosities, or they follow from the law that is fitted to the table.
+        The viscosities are given by the user, or are computed from the law that is fitted to the table.
         """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
@@ -137,7 +137,7 @@ class _Fit(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
-    """Fit Walther's law to a table of viscosities; raise DataError if no fit is possible."""
+    """Fit Walther's law to a table of viscosities. Raise DataError if no fit is possible."""
     text = file.read_text()
     is_dynamic = any(converts(unit, "Pa s") for unit in read_sheet(text, file.name).units)
     viscous = Column("dynamic viscosity", "Pa s", above=0)

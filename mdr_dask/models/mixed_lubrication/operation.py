@@ -16,7 +16,7 @@ from mdr_dask.physics.outcome import Outcome
 
 
 class NoFilmError(Exception):
-    """Raised if the film of a case cannot be computed."""
+    """Error that is raised if the film of a case cannot be computed."""
 
 
 class Film(NamedTuple):
@@ -30,9 +30,9 @@ class Film(NamedTuple):
 class Operation:
     """The smooth contact, the film and the boundary layer of a case.
 
-    `viscosity` is the dynamic viscosity in Pa s, `alpha` the pressure-viscosity coefficient in 1/Pa, and `width` the
-    width of the contact in m. `film_error` is the relative error of the film thickness. The solver uses heights
-    that are divided by the length `scale`, in m; `strength` is the strength of the boundary layer for these heights.
+    `viscosity` is the dynamic viscosity in Pa s. `alpha` is the pressure-viscosity coefficient in 1/Pa. `width` is the
+    width of the contact in m. `film_error` is the relative error of the film thickness. The solver uses heights that
+    are divided by `scale`, a length in m. `strength` is the strength of the boundary layer, divided by `scale`.
     """
 
     case: MixedLubrication
@@ -54,7 +54,7 @@ class Operation:
 
     @property
     def level(self) -> float:
-        """Film thickness divided by `scale`, like the heights of the lines."""
+        """Film thickness divided by `scale`."""
         return self.film / self.scale
 
     @property
@@ -74,7 +74,7 @@ class Operation:
 
 
 def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Operation:
-    """Return the smooth contact and the film of a case; raise NoFilmError if the EHL solution fails."""
+    """Return the smooth contact and the film of a case. Raise NoFilmError if the EHL solution fails."""
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
     alpha = case.pressure_viscosity
@@ -114,8 +114,8 @@ def _shared_load(
 ) -> tuple[SharedLoad, float, str]:
     """Return the film thickness with the load shares, the relative error of the film thickness, and a warning.
 
-    The warning is empty unless the case is outside the range of the film formula, or the user gives a film thickness
-    at which asperities would carry more than the load.
+    The warning is an empty string unless the case is outside the range of the film formula, or the user gives a film
+    thickness at which asperities would carry more than the load.
     """
     pressure = _mean_pressure(case)
 
@@ -137,7 +137,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function that computes the film from the load share of the film, and a warning."""
+    """Return a function that computes the film from the fraction of the load on the film. Also return a warning."""
     E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
@@ -165,7 +165,7 @@ def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
     """Return the central film thickness of the EHL solution in units of ``a^2/R``, and its relative error."""
     solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
-        return Film(0.0)  # the film is too thin for the grids; the asperities will carry nearly the whole load
+        return Film(0.0)  # the film is too thin for the grids: the asperities will carry nearly the whole load
     if solution.reason:
         raise NoFilmError(solution.reason)
     film = solution.central_film
@@ -183,7 +183,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # the error of the asperity load is its change when the film becomes thinner by the error of the film thickness
+        # error of the asperity load: change of this load if the film is thinner by the error of the film thickness
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {

@@ -15,8 +15,9 @@ from mdr_dask.physics.lubrication import breakthrough, film_formulas
 from mdr_dask.physics.lubrication.clusters import find_clusters
 from mdr_dask.physics.surfaces.splines import heights
 
-PARTS = 16  # largest number of parts of a revolution; the scatter between the parts gives the standard error
-WINDOWS = 4  # with sliding: width of a window over the distance of neighbouring windows on the coarsest grid
+#: Largest number of parts of a revolution. The scatter between the parts gives the standard error.
+PARTS = 16
+WINDOWS = 4  # with sliding: width of a window divided by the distance between windows on the coarsest grid
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,8 @@ class Revolution:
     """Intimate contact during one revolution of the rollers.
 
     A window is the part of both lines that is in the Hertzian contact at one instant. The windows are equidistant in
-    time. `contact` times `unit` is the length in m that is in intimate contact in each window. `parts` is the number of
-    equal parts into which the revolution is divided.
+    time. `contact` times `unit` is the length in intimate contact in each window, in m. `parts` is the number of equal
+    parts into which the revolution is divided.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -39,12 +40,12 @@ class Revolution:
 
     @property
     def length(self) -> float:
-        """Length in intimate contact in m, as a mean over the windows."""
+        """Length in intimate contact in m, averaged over the windows."""
         return int(self.contact.sum(dtype=np.int64)) / self.contact.size * self.unit
 
     @property
     def standard_error(self) -> float:
-        """Standard error of the probability, from the scatter between the parts; NaN if there is only one part."""
+        """Standard error of the probability, from the scatter between the parts, or NaN if there is only one part."""
         if self.parts < 2:
             return np.nan
         shares = [np.count_nonzero(part) / part.size for part in np.array_split(self.contact, self.parts)]
@@ -52,7 +53,7 @@ class Revolution:
 
 
 def revolve(operation: Operation, lines: FloatArray) -> Revolution:
-    """Find the intimate contact during one revolution; `lines` are the splines of both lines, shape (2, points)."""
+    """Find the intimate contact during one revolution. `lines` are the splines of both lines, shape (2, points)."""
     case, points = operation.case, lines.shape[1]
     spacing, creep = operation.length / points, case.slide_roll_ratio
     width = operation.width / spacing
@@ -82,7 +83,7 @@ def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> 
     """Return the scalar outputs of a realisation and their errors.
 
     `errors` contains the error of the probability and the error of the length in m. Conductance and resistance are
-    those of all independent squares across the rollers, connected in parallel.
+    computed for all independent squares across the rollers, connected in parallel.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()

@@ -1,4 +1,4 @@
-"""Solve a block of cases: mixed lubrication of two rough rollers."""
+"""Solution of a block of cases of mixed lubrication of two rough rollers."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from mdr_dask.physics.refine import Solution, refine
 #: `_OF_LENGTH`: outputs that follow from the length in intimate contact. `_OF_LINES`: outputs that need rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
-#: Outputs that can be zero, each with a floor. If an output is smaller than its floor, its relative error is the error
-#: divided by the floor. The floor of the contact length is in units of the width of the contact.
+#: Outputs that can be zero, each with a floor. The error of an output that is smaller than the floor is divided by the
+#: floor. The floor of the contact length is divided by the width of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
-#: Parameters on which the rough lines depend. Cases with equal values of all these parameters share their lines.
+#: Parameters on which the rough lines depend. Cases have the same lines if all these parameters are equal.
 _SHARED = {
     *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
     *("roller_radius", "roller_width", "contact_modulus"),
@@ -33,7 +33,7 @@ _SHARED = {
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
-    """Solve the cases of a block; one realisation is one revolution of the rollers with random lines.
+    """Solve the cases of a block. One realisation is one revolution of the rollers with random lines.
 
     In each realisation, cases that differ only in load, speed, temperature, rms height or boundary layer have the same
     lines.
@@ -105,7 +105,7 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute one realisation of all cases that share lines."""
+    """Compute one realisation of all cases with the same lines."""
     lines = lru_cache(maxsize=1)(partial(source.lines, block.seed, block.realisations[position]))
     found: list[Revolution] = [None] * len(members)  # type: ignore[list-item]
     arrays: list[dict[str, FloatArray]] = [{}] * len(members)
@@ -123,11 +123,11 @@ def _realise(
 
     floors = [_FLOORS["breakthrough_probability"], _FLOORS["contact_length"]][: 1 + with_length]
     points = source.points
-    if block.accuracy is None:  # two grids if errors are requested, otherwise one
+    if block.accuracy is None:  # two grids if errors are requested, otherwise one grid
         points = points[:2] if any(f"{name}_error" in block.outputs for name in _OF_LINES) else points[:2][-1:]
     accuracy = block.accuracy or np.inf
-    # splines converge faster than at first order, but a single cluster may break the layer on one grid and not on the
-    # next grid, and contact may begin between two windows
+    # The assumed order of convergence is 1, although splines converge faster: a single cluster may break the layer on
+    # one grid but not on the next grid, and contact may begin between two windows.
     errors = refine(solve, len(members), points, accuracy, order=1, floors=floors).errors
     for k, (index, operation) in enumerate(members):
         of_length = errors[-1, k] * operation.width if with_length else np.nan
@@ -147,7 +147,7 @@ def _realise(
 
 
 def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:
-    """Yield a warning for each assumption of the model that a case violates."""
+    """Yield a warning for each assumption of the model that does not hold in a case."""
     if operation.warning:
         yield operation.warning
     if operation.squares < 1:
@@ -165,8 +165,9 @@ def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:
 def operations(block: Block[MixedLubrication]) -> float:
     """Return the approximate number of operations of a block. Only the two coarsest grids of every case are counted.
 
-    Each point needs about 40 operations for a line, and 10 for a case. With sliding, each point lies in `WINDOWS`
-    windows or more. An EHL film needs about ten solutions to find the load shares.
+    Each point needs about 40 operations to make the lines, and 10 operations in each case. With sliding, a case needs
+    at least `WINDOWS` times as many operations, because each point lies in several windows. An EHL film needs about ten
+    solutions to find the load shares.
     """
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     points_of = np.empty(block.cases)

@@ -1,4 +1,4 @@
-"""Find the cases whose estimated errors exceed the accuracy that a campaign requires."""
+"""Messages about cases whose estimated errors exceed the accuracy that a campaign requires."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return a message for every case in which an output misses the accuracy, indexed by the number of the case.
+    """Return a message for every case in which an output misses the accuracy. The key is the index of the case.
 
-    The relative error is the largest absolute error of the output, divided by its largest absolute value or by its
-    floor, whichever is larger. `values` and `errors` have the shape (cases, ...); elements that are NaN in `values` or
-    in `errors` are ignored. `where` is added to the messages, such as ``" on the finest grid"``.
+    The relative error of an output is the largest absolute error in the case, divided by the largest absolute value in
+    the case. If this value is below the floor of the output, the error is divided by the floor. `values` and `errors`
+    have the shape (cases, ...). Elements that are NaN in `values` or in `errors` are ignored. The text `where` is added
+    to the messages, such as ``" on the finest grid"``.
     """
     shares = {
         name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()
@@ -43,7 +44,8 @@ def missed_accuracy(
 def _relative_errors(values: ArrayLike, errors: ArrayLike, floor: ArrayLike) -> FloatArray:
     """Return the relative error of one output for every case, shape (cases,).
 
-    The relative error is 0 if all errors are 0, and infinite if all values and the floor are 0 but some error is not.
+    The relative error of a case is 0 if all errors are 0. The relative error is infinite if some error is not 0, but
+    all values and the floor are 0.
     """
     size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (values, errors))
     known = ~(np.isnan(size) | np.isnan(error))

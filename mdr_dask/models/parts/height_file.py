@@ -1,4 +1,4 @@
-"""Read maps and line scans of heights from text files, from numpy files, and from files of instruments."""
+"""Maps and line scans of heights, read from text files, from numpy files, and from files of instruments."""
 
 from __future__ import annotations
 
@@ -51,7 +51,10 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of a file. The rows run along x. The steps along x and y are in the unit of the positions."""
+    """Heights in the unit of a file.
+
+    The rows run along x. The steps of the grid along x and y are in the unit of the positions.
+    """
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -60,7 +63,7 @@ class _Grid(NamedTuple):
 
 
 def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]:
-    """Return the map in a file, and remarks on how it was read.
+    """Return the map in a file, and remarks on how the file was read.
 
     The file is a text, an npy file, or a file that SurfaceTopography can read. Each row of a text or npy file contains
     the heights along x at one y. In the map, missing points are NaN. `units` are the units and spacings that the user
@@ -135,10 +138,10 @@ def dimensions(file: DataFile) -> int:
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
     """Return the unit of the heights in m, such as 1e-6, and the spacings along x and y in m.
 
-    Unit and spacings are taken from the file or from the options of the user. If only the unit of the positions is
-    missing, it is the power of ten of a metre that gives the spacing that the user states: for positions 0, 0.5, 1 ...
-    and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... without a unit are numbers of pixels if the user
-    states the spacing.
+    Unit and spacings are taken from the file or from the options of the user. If the unit of the positions is missing
+    and the user states the spacing, the unit is taken as the power of ten of a metre that fits the spacing. For
+    positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... are then taken as indices
+    of points.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -189,7 +192,7 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file, read by SurfaceTopography; return None for a text."""
+    """Return the main channel of a file, read by SurfaceTopography. Return None for a text file."""
     file.read_bytes()  # raises an error if the file has changed
     import warnings
 
@@ -197,7 +200,7 @@ def _channel(file: DataFile) -> Any:
     if file.name.lower().endswith(TEXT):
         try:
             file.read_text()
-        except DataError as problem:  # a binary file whose name ends like that of a text, such as .dat of Zygo
+        except DataError as problem:  # a binary file with a file name extension of text files, such as .dat of Zygo
             not_text = f" ({problem})"
         else:
             return None
@@ -214,7 +217,7 @@ def _channel(file: DataFile) -> Any:
 
 
 def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
-    """Return the map or line scan of a channel, and the unit that its heights and its positions have in common."""
+    """Return the map or line scan of a channel, and the common unit of heights and positions."""
     stated = channel.unit or ""
     unit = _one_unit(file, "unit", stated, units.height)
     if not unit:
@@ -252,10 +255,10 @@ def _array(file: DataFile) -> FloatArray:
 
 
 def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
-    """Return the heights of a grid file of Surfer or ESRI; return None for any other text.
+    """Return the heights of a grid file of Surfer or ESRI. Return None for any other text.
 
-    A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z; its rows have ascending y. An
-    ESRI text begins with lines such as ``ncols 512``; its rows have descending y.
+    A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z. The rows of a Surfer text have
+    ascending y. An ESRI text begins with lines such as ``ncols 512``. The rows of an ESRI text have descending y.
     """
     kind = {"dsaa": "Surfer", "ncols": "ESRI"}.get("".join(lines[:1]).casefold().partition(" ")[0].strip())
     if kind is None:
@@ -364,7 +367,7 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
         rows = [line.rstrip(" ").removesuffix(separator) for line in rows]
     width = [len(line.split(separator)) for line in rows]
     common = max(set(width), key=width.count, default=0)
-    # skip lines of numbers above the table, which have fewer or more columns
+    # skip lines of numbers above the table that have fewer or more columns than the table
     start = next((k for k, count in enumerate(width) if count == common), 0)
     odd = next((k for k in range(start, len(width)) if width[k] != common), None)
     first = lines.index(kept[numeric[0] + start]) if kept else 0
@@ -395,7 +398,7 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return an index and a unit for each of the columns x, y and z; return () if one of the three is missing.
+    """Return an index and a unit for each of the columns x, y and z. Return () if one of these columns is missing.
 
     If the columns have no names, x, y and z are the three columns that do not hold row numbers.
     """
@@ -417,7 +420,10 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFra
 
 
 def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame, stated: Units) -> _Grid:
-    """Return the heights of a table with rows x, y, z in any order. A grid point without a row is a missing point."""
+    """Return the heights of a table whose rows contain x, y and z.
+
+    The rows can be in any order. A grid point without a row is a missing point.
+    """
     columns = _coordinates(file, lines, first, cells)
     if not columns:
         raise DataError(
@@ -439,8 +445,8 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return the positions and the heights of a line scan, both in m, from a table.
 
-    If the columns have no names, the positions are the column whose numbers only rise or only fall. A single column of
-    numbers contains the heights, whatever text is above it; the user must then give the spacing.
+    If the columns have no names, the column whose numbers only rise or only fall contains the positions. A single
+    column of numbers contains the heights, whatever text is above the column. The user must then give the spacing.
     """
     text = file.read_text()
     sheet = read_sheet(text, file.name)

@@ -27,7 +27,7 @@ class _PowerLaw(Parameters):
     """A body of revolution whose height is a power of the distance from its axis."""
 
     def power_law(self) -> tuple[float, float]:
-        """Return coefficient c and exponent n of the body c r^n; c is NaN if the size of the body is not given."""
+        """Return coefficient c and exponent n of the body c r^n. If the size of the body is not given, c is NaN."""
         raise NotImplementedError
 
     def line(self) -> Shape:
@@ -76,7 +76,7 @@ class Power(_PowerLaw):
 
 
 class RoundedCone(Parameters):
-    """A cone with a rounded tip; the slope is continuous where the tip meets the cone."""
+    """A cone with a rounded tip. The slope is continuous where the tip meets the cone."""
 
     shape: Literal["rounded_cone"]
     angle: float = quantity(

@@ -96,7 +96,7 @@ class Oscillation(_History):
 
 
 class TableFile(_History):
-    """Velocity and load from a table, interpolated linearly between rows; two rows with the same time give a jump."""
+    """Velocity and load from a table, interpolated linearly between rows. Two rows with the same time give a jump."""
 
     shape: Literal["table"]
     file: NamedFile = Field(description="table with the columns time and velocity, and optionally force")

@@ -146,7 +146,10 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the relaxation times at the material's temperature, divided by the relaxation times of the data."""
+    """Return the ratio of the relaxation times at the material's temperature to the relaxation times of the data.
+
+    Return None if the material has no temperature.
+    """
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
@@ -180,7 +183,7 @@ def _solid(material: Material) -> LinearSolid:
 
 
 def _fit_of(material: Material) -> SeriesFit | None:
-    """Return the Prony series fitted to a power law or a table; return None for other materials."""
+    """Return the Prony series fitted to a power law or a table. Return None for other materials."""
     if material.power_law is not None:
         return _power_law_fit(material.power_law)
     return None if material.dma_table is None else _table_fit(material.dma_table, material.law)
@@ -203,7 +206,10 @@ def _power_law_fit(law: PowerLaw) -> SeriesFit:
 
 
 def fit_error(material: Material | None) -> float:
-    """Return the rms relative error of a Prony series that is fitted to a power law or a table; otherwise return 0."""
+    """Return the rms relative error of a Prony series that is fitted to a power law or a table.
+
+    Return 0 for other materials.
+    """
     fit = None if material is None else _fit_of(material)
     return 0.0 if fit is None else fit.error
 

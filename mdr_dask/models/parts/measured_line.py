@@ -75,7 +75,7 @@ def _scan(profile: ProfileFile) -> Scan:
 
 @lru_cache(maxsize=16)
 def line_of(profile: ProfileFile) -> MeasuredLine:
-    """Return the measured line, which is repeated periodically; raise DataError if the file contains no line."""
+    """Return one period of the measured line. Raise DataError if the file contains no line."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
     scan = _scan(profile)

@@ -26,7 +26,7 @@ _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNOREC
 #: Columns that determine storage and loss modulus.
 WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
 SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this value count as equal
-#: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
+#: Gap in decades between the moduli of neighbouring curves. The scatter of an instrument can explain smaller gaps.
 APART = 0.02
 
 
@@ -157,7 +157,7 @@ def _near(temperature: FloatArray, wanted: float) -> FloatArray:
 
 
 def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return, for every row, the index of its temperature, and the different temperatures in ascending order."""
+    """Return the index of the temperature of every row, and the distinct temperatures in ascending order."""
     order = np.argsort(temperature, kind="stable")
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
@@ -176,7 +176,7 @@ def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: fl
 
 
 def _vertical(chosen: ModulusTable) -> str:
-    """Return a text that says whether moduli are multiplied by b_T, and with which thermal expansion."""
+    """Return a text that says whether moduli are multiplied by b_T, and the thermal expansion that determines b_T."""
     from mdr_dask.physics.superposition.master_curve import EXPANSION
 
     if chosen.vertical == "none":
@@ -215,7 +215,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between the shift factors found from the curves and those of `law`."""
+    """Return a text with the largest difference between the shift factors of the curves and of `law`."""
     if law is None:
         return ""
     try:
@@ -254,7 +254,7 @@ def _require_overlap(moduli: FloatArray, member: IntArray, levels: FloatArray) -
 
 
 def moduli_of(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return storage and loss modulus, computed from the columns of one of the `WAYS`; the phase angle is in rad."""
+    """Return storage and loss modulus, computed from the columns of one of the `WAYS`. The phase angle is in rad."""
     if "complex modulus" in columns:
         size, angle = columns["complex modulus"], columns["phase angle"]
         return size * np.cos(angle), size * np.sin(angle)

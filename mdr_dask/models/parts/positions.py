@@ -1,4 +1,4 @@
-"""Find positions and row numbers in tables of heights, and the regular grid on which the positions lie."""
+"""Positions and row numbers in tables of heights, and the regular grid on which the positions lie."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from mdr_dask.units import shown
 OUTER = 3
 """Largest number of rows or columns on each side of a table that may hold positions or row numbers."""
 BREAK = 3.0
-"""A row or column holds positions if it differs from its neighbours by more than this times the largest difference
-between rows or columns of heights (see `_leading`)."""
+"""A row or column holds positions if its difference from the adjacent rows or columns exceeds this factor times the
+largest difference between rows or columns of heights (see `_leading`)."""
 FAR_ALONE = 10.0
 """A number that occurs once is not a height if its distance from all other heights exceeds this many times the range of
 those other heights."""
 FEW_LEVELS = 10
-"""Heights with at most this many different values belong to a designed surface, such as a grating."""
+"""Heights with at most this many distinct values belong to a designed surface, such as a grating."""
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
@@ -32,8 +32,8 @@ def rising(lines: FloatArray) -> NDArray[np.bool_]:
 def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None, float | None], tuple[str, ...]]:
     """Remove positions and row numbers from the outermost rows and columns of a table of heights.
 
-    Return the heights, the steps of the positions along x and y, and remarks that name the removed rows and columns. A
-    step is None if the table has no positions along this axis.
+    Return the heights, the steps of the positions along x and y, and remarks that name the removed rows and columns.
+    The step along x is None if the table has no positions along x. The same applies to y.
     """
     if min(rows.shape) < 4 * OUTER:
         return rows, (None, None), ()
@@ -52,8 +52,8 @@ def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None,
 def _leading(lines: FloatArray) -> int:
     """Return how many of the first rows of a table hold positions or row numbers.
 
-    On a tilted surface the heights of a row may also only rise or only fall. Such a row counts as positions only if it
-    differs much more from the adjacent rows than rows of heights differ from each other.
+    On a tilted surface the heights of a row may also only rise or only fall. Such a row counts as positions only if the
+    row differs much more from adjacent rows than rows of heights differ from each other.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -71,9 +71,9 @@ def is_numbered(line: FloatArray) -> bool:
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the step of the positions in all given rows (or columns); raise DataError if two of their steps differ.
+    """Return the common step of the positions in the given rows or columns. Raise DataError if the steps differ.
 
-    Rows of consecutive integers are row numbers and have no step.
+    Rows of consecutive integers are row numbers and are ignored. Return None if no other rows are left.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
@@ -91,8 +91,8 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
-    # Positions on one grid line differ by small deviations, and adjacent grid lines by 1 to about 3 steps. A gap counts
-    # as a deviation if it is at most a quarter of the largest gap.
+    # Positions on one grid line differ by small deviations. Positions on adjacent grid lines differ by 1 to about 3
+    # steps. A gap counts as a deviation if the gap is at most a quarter of the largest gap.
     lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):
@@ -109,7 +109,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 
 
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
-    """Arrange points, which are given in any order, in rows of heights; return the rows and the steps along x and y.
+    """Arrange points, given in any order, in rows of heights. Return the rows and the steps along x and y.
 
     Grid points without a height become NaN.
     """
@@ -127,9 +127,9 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
 
     The largest number is replaced if its distance from the next smaller number exceeds the range of all numbers between
     the smallest and the largest. The same applies to the smallest number. A number that occurs only once may be the
-    height of a narrow groove or peak, and is replaced only if its distance exceeds `FAR_ALONE` times the range. A
-    surface such as a grating, with at most `FEW_LEVELS` different heights between the smallest and the largest number,
-    is left unchanged.
+    height of a narrow groove or peak. Such a number is replaced only if the distance exceeds `FAR_ALONE` times the
+    range. A surface such as a grating, with at most `FEW_LEVELS` distinct heights between the smallest and the largest
+    number, is left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

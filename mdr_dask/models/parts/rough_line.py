@@ -1,6 +1,6 @@
 """The four kinds of rough lines: generated, with the spectrum of a surface, measured, and smooth.
 
-Heights are divided by the rms height of the line, and positions by its length.
+Heights are divided by the rms height of the line. Positions are divided by the length of the line.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Generated:
     is_random = True
 
     def waves(self, seed: int, realisation: int) -> Waves:
-        """Return one realisation; raise ValueError if no wave lies between the cut-off wavelengths."""
+        """Return the waves of one realisation. Raise ValueError if no wave lies between the cut-off wavelengths."""
         return _with_random_phases(_amplitudes(self), self.points, seed, realisation)
 
     def slope(self, realisation: int) -> float:
@@ -63,8 +63,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface and random phases.
 
-    If the surface has several files, the realisations use the files in turn, so that their scatter includes the scatter
-    between files.
+    If the surface has several files, the realisations use the files in turn. The scatter between realisations then
+    includes the scatter between files.
     """
 
     surface: Surface
@@ -77,7 +77,7 @@ class OfSurface:
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:
-        """Return one realisation."""
+        """Return the waves of one realisation."""
         return _with_random_phases(self._amplitudes(realisation), self.points, seed, realisation)
 
     def slope(self, realisation: int) -> float:
@@ -99,7 +99,7 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The measured profile of a file, which is the same line in all realisations."""
+    """The measured profile of a file. All realisations have the same line."""
 
     profile: ProfileFile
     is_random = False
@@ -132,7 +132,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A line without roughness; solvers choose the same grids as for a rough line with `points` points."""
+    """A line without roughness. Solvers choose the same grids as for a rough line with `points` points."""
 
     points: int
     is_random = False

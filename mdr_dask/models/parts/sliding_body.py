@@ -16,7 +16,7 @@ from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
 from mdr_dask.units import shown
 
-#: Parameters of generated roughness, which a measured surface replaces.
+#: Parameters of generated roughness. A measured surface replaces all these parameters.
 GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
 #: Dimensionless numbers of a Kelvin body on a generated line.
 NUMBERS = (

@@ -1,4 +1,4 @@
-"""Convert the sliding bodies of a block to dimensionless loads, velocities, lines and solids."""
+"""Dimensionless loads, velocities, lines and solids of the sliding bodies of a block."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class Setting:
 class SlidingProblems:
     """The cases of a block as dimensionless numbers.
 
-    `which` holds, for every case, its index into `settings`, or -1 if the case cannot be solved. `loads` are F_N / (4
+    `which` holds the index into `settings` for every case, or -1 for a case that cannot be solved. `loads` are F_N / (4
     G_inf L h) with the static shear modulus G_inf. `deborah` are the Deborah numbers eta v / (G_inf L) with the
-    viscosity eta; for a Kelvin body this is v tau / L. `length` is the length L of the line in m. `height` is the rms
-    height h in m, or L if there is no roughness. `faults` has a message for each case that cannot be solved; the key is
-    the index of the case.
+    viscosity eta. For a Kelvin body, the Deborah number is v tau / L. `length` is the length L of the line in m.
+    `height` is the rms height h in m, or L if there is no roughness. `faults` has a message for each case that cannot
+    be solved. The key is the index of the case.
     """
 
     settings: list[Setting]
@@ -82,15 +82,15 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs of Deborah number and load of some cases, and the index of every case's pair."""
+        """Return the distinct pairs of Deborah number and load of some cases, and the index of each case's pair."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
 
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
-    """Find the different rows of a table whose columns are given. Objects are compared by identity.
+    """Find the distinct rows of a table with the given columns. Objects are compared by identity.
 
-    Return the index of the first row with each combination of values, and for every row the index of its combination.
+    Return the first index of each distinct row in the table, and for every row its index among the distinct rows.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -170,7 +170,7 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
-    """Return the different values of a nested parameter, and for every case the index of its value."""
+    """Return the distinct values of a nested parameter, and for every case its index among these values."""
     varied = [column for path, column in block.columns.items() if path.partition(".")[0] == name]
     if not varied:
         return [getattr(block.parameters, name)], np.zeros(block.cases, np.int64)
@@ -181,7 +181,10 @@ def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
 def _lines(
     block: Block[Any], faults: dict[int, str]
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
-    """Return the different lines and, for every case, the index of its line, the length L and the height h."""
+    """Return the distinct rough lines, and for every case the index of its line, the length L and the rms height h.
+
+    For a smooth line, L is returned in place of h. A line that cannot be made is None.
+    """
     length, height = block.numbers("length"), block.numbers("rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
@@ -215,10 +218,10 @@ def _lines(
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
-    """Return the static modulus in Pa and the ratio of viscosity to static modulus in s, both for every case.
+    """Return, for every case, the static modulus in Pa and the ratio of viscosity to static modulus in s.
 
-    Also return the Prony terms of each different solid, and for every case the index of its solid. Prony terms are
-    moduli divided by the static modulus, with relaxation times in s. The Prony terms of a Kelvin solid are None.
+    Also return the Prony terms of each distinct solid, and for every case the index of its solid. Prony terms consist
+    of moduli divided by the static modulus, and of relaxation times in s. The Prony terms of a Kelvin solid are None.
     """
     static, viscosity = block.numbers("shear_modulus"), block.numbers("relaxation_time")
     materials, which = each(block, "material")

@@ -1,4 +1,4 @@
-"""A measured surface of a campaign, given by its spectrum, by maps, by scans, or by a line that is used unchanged."""
+"""A measured surface of a campaign, given by a spectrum, by maps, by scans, or by a line that is used unchanged."""
 
 from __future__ import annotations
 
@@ -113,14 +113,17 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the parameters in `value`. With a measured surface but no Hurst exponent, add ``hurst: None``."""
+    """Return the parameters in `value`.
+
+    If `value` contains a measured surface but no Hurst exponent, add ``hurst: None``.
+    """
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
 
 
 @lru_cache(maxsize=64)
 def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
-    """Return the spectra C2D of a surface between its cut-offs, one for each file."""
+    """Return the spectrum C2D of each file of a surface, between the cut-off wavelengths."""
     return tuple(
         _within(surface, found, file)
         for file, found in zip(surface.measured.files, surface.measured.found(), strict=False)
@@ -128,7 +131,10 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between its cut-offs. Without `shortest_wavelength`, the spectrum ends where noise begins."""
+    """Return a spectrum between the cut-off wavelengths.
+
+    Without `shortest_wavelength`, the spectrum ends where noise begins.
+    """
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:

@@ -27,7 +27,7 @@ CUT_ERROR = 0.05  # assumed relative error of each point, if a table contains th
 MOST_ANISOTROPY = 0.25
 # A map has stripes if waves along x or y have more than this many times the mean power of all waves of equal length.
 STRIPES = 10.0
-FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of their mean square
+FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of the mean square height
 # If more than this fraction of the points lie far from their neighbours, these points belong to the surface and are not
 # outliers.
 MOST_OUTLIERS = 0.05
@@ -64,7 +64,7 @@ class Files(NamedByFile):
     )
 
     def found(self) -> tuple[Found, ...]:
-        """Return the spectrum of every file; raise DataError if a file has no spectrum."""
+        """Return the spectrum of every file. Raise DataError if a file has no spectrum."""
         raise NotImplementedError
 
 
@@ -186,7 +186,7 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
-    """Return warnings if a line may contain the form of the measured part, or if it is steeper than 45 degrees."""
+    """Return warnings if a line may contain the form of the measured part, or if the rms slope exceeds 45 degrees."""
     place = np.linspace(-1, 1, line.height.size)
     level, curved = (line.height - np.polyval(np.polyfit(place, line.height, order), place) for order in (1, 2))
     form = _form(level, curved) if detrend != "parabola" else ()
@@ -194,9 +194,9 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola fits the levelled heights well, so that they may contain the form of the part.
+    """Return a warning if a parabola fits the levelled heights well. The heights may then contain the form of the part.
 
-    `level` are the heights without a fitted plane or line, and `curved` the heights without a fitted parabola.
+    `level` are the heights minus a fitted plane or line. `curved` are the heights minus a fitted parabola.
     """
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
     if not rest < (1 - FORM) * square:
@@ -230,7 +230,10 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map: averaged over all directions, or of profiles along the given `direction`."""
+    """Return the spectrum of one map, averaged over all directions.
+
+    With `direction`, use profiles along this direction.
+    """
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
@@ -247,7 +250,7 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
 def anisotropic(maps: MapFiles, file: DataFile) -> str:
     """Return the reason why a map has no isotropic spectrum.
 
-    The text is empty if the map is isotropic, or if the user gives a sliding direction.
+    Return an empty string if the map is isotropic, or if the user gives a sliding direction.
     """
     rings = levelled_map(maps, file).spectrum
     if maps.direction is not None or rings.anisotropy() <= MOST_ANISOTROPY:

@@ -40,10 +40,10 @@ UNITS = {
 }
 """Columns of a report and their units. A value is NaN if a file does not determine the quantity.
 
-* Sq and Sa: rms height and mean absolute height of the levelled map. Pq: rms height of the levelled profile. These
-three are computed without a window; gradient, slopes and anisotropy are computed from the windowed heights.
-* hurst, rolloff and cutoff: Hurst exponent, longest and shortest wavelength of the fitted power law, each with the
-ends of its 95 % confidence interval (`_low` and `_high`).
+* Sq and Sa: rms height and mean absolute height of the levelled map. Pq: rms height of the levelled profile. Sq, Sa and
+Pq are computed without a window. Gradient, slopes and anisotropy are computed from the windowed heights.
+* hurst, rolloff and cutoff: Hurst exponent, longest and shortest wavelength of the fitted power law, each with the ends
+of its 95 % confidence interval (`_low` and `_high`).
 * resolution: shortest wavelength that is not only noise. length: longest wavelength of a map, length of a profile.
 """
 
@@ -52,8 +52,8 @@ class FileReport(NamedTuple):
     """Report on one file.
 
     `row` contains a value for each name in `UNITS`. `bins` contains C2D and the standard error of log C2D. `cuts`
-    contains the wave numbers and the power spectrum, in m^3, of straight profiles along "x", and for a map along "y"
-    too. `law` is the fitted power law, or None if no power law fits.
+    contains the wave numbers and the power spectrum, in m^3, of straight profiles. The key is "x" or "y", the direction
+    of the profiles. `law` is the fitted power law, or None if no power law fits.
     """
 
     file: DataFile
@@ -65,7 +65,7 @@ class FileReport(NamedTuple):
 
 
 def reports(surface: Surface) -> tuple[FileReport, ...]:
-    """Return a report on each file of a surface; raise DataError if a file cannot be read."""
+    """Return a report on each file of a surface. Raise DataError if a file cannot be read."""
     measured = surface.measured
     return tuple(_report(surface, file, found) for file, found in zip(measured.files, measured.found(), strict=True))
 
@@ -114,7 +114,7 @@ def _of_scan(scans: ScanFiles, file: DataFile, row: dict[str, float | str]) -> d
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the wave numbers of the first spectrum, the mean of the spectra, and its relative standard error.
+    """Return the wave numbers of the first spectrum, the mean spectrum, and the relative standard error of the mean.
 
     At each wave number, the mean includes only the spectra whose range contains this wave number.
     """

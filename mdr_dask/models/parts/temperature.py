@@ -1,6 +1,6 @@
-"""Parameters of temperature laws, which give the factor a_T.
+"""Parameters of the laws that give the factor a_T as a function of the temperature.
 
-The relaxation times at a temperature are those at the reference temperature, multiplied by a_T.
+The relaxation times at a temperature are a_T times the relaxation times at the reference temperature.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Wlf(Parameters):
     reference: float = quantity("K", "reference temperature for c1 and c2, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K; raise ValueError for temperatures at which the law diverges."""
+        """Return a_T for temperatures in K. Raise ValueError for temperatures at which the law diverges."""
         from mdr_dask.physics.solids import wlf_factor
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
@@ -72,7 +72,7 @@ class ShiftFactors(NamedByFile):
         return float(np.interp(0.0, decades[::-1], temperature[::-1]))
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, by linear interpolation of log a_T; raise ValueError outside the table."""
+        """Return a_T for temperatures in K, by linear interpolation of log a_T. Raise ValueError outside the table."""
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():

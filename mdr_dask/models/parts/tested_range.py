@@ -14,7 +14,7 @@ from mdr_dask.models.parts.sliding_body import SlidingBody
 from mdr_dask.models.parts.sliding_problem import Setting
 
 LARGEST_LOAD = 1.0
-"""Largest tested load F_N / (E* L h); E* = 4 G for an incompressible solid.
+"""Largest tested load F_N / (E* L h). For an incompressible solid, E* = 4 G.
 
 At higher loads the line comes much closer to full contact than the surface that it represents.
 """
@@ -47,11 +47,11 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
-    """Return a message for every case outside the tested range, indexed by the number of the case.
+    """Return a message for every case outside the tested range. The key is the index of the case.
 
     `loads` are F_N / (4 G_inf L h), and `fractions` are the fractions of the line in contact. For a loading history,
     loads and fractions are the largest values during the history. Only plane bodies with the spectrum of a measured
-    surface are checked; other bodies give no messages.
+    surface are checked. There are no messages for other bodies.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

@@ -1,4 +1,4 @@
-"""Solve a block of cases: steady friction."""
+"""Solution of a block of cases of steady friction."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# Number of nodes of the finest grid that is usually needed, divided by the number of points of the line: for plane
-# Kelvin bodies, and for all other bodies.
+# Number of nodes of the finest grid that is usually needed, divided by the number of points of the line. The first
+# value is for plane Kelvin bodies, the second value is for all other bodies.
 USUAL_ON_PLANES, USUAL = 2, 16
 BYTES_A_NODE = 150  # peak memory in bytes per grid point, for a line and one case; 20 to 130 bytes were measured
 OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line
@@ -54,14 +54,14 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield the setting, one case and the indices of all cases, for each group of cases with equal setting and grid."""
+    """Yield groups of cases with equal setting and grid: the setting, one case, and the indices of all cases."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
 
 
 class _Group:
-    """Cases with the same line, solid and grid; equal cases are solved once."""
+    """Cases with the same line, solid and grid. Equal cases are solved only once."""
 
     def __init__(
         self,
@@ -80,7 +80,10 @@ class _Group:
         self.request = Request(accuracy, case.oversampling, case.scheme, with_errors, contact)
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Solve realisation number r of the block and write its results; return the number of solved cases."""
+        """Solve the realisation with the index r in the block and write the results.
+
+        Return the number of solved cases.
+        """
         roughness = self.setting.roughness
         if r and not roughness.is_random:
             self._repeat(result, r)
@@ -105,7 +108,10 @@ class _Group:
         return int(self.loads.size)
 
     def _repeat(self, result: Result, r: int) -> None:
-        """Copy the results of the first realisation to realisation number r of the block, which has the same line."""
+        """Copy the results of the first realisation to the realisation with the index r.
+
+        Both realisations have the same line.
+        """
         for array in result.values.values():
             array[self.members, r] = array[self.members, 0]
         result.status[self.members, r] = result.status[self.members, 0]
@@ -113,7 +119,7 @@ class _Group:
         result.messages.update({(j, r): message for j, message in first.items()})
 
     def _outputs(self, columns: FloatArray) -> dict[str, FloatArray]:
-        """Return the outputs of the cases of the group, or their errors, in SI units."""
+        """Convert dimensionless outputs, or errors of outputs, to SI units for every case of the group."""
         drag, depth, fraction, contact_slope = columns
         slope = self.height / self.length
         in_units = (drag / self.loads)[self.which] * slope, depth[self.which] * self.height, fraction[self.which]
@@ -143,7 +149,7 @@ def distinct(block: Block[SlidingFriction]) -> int:
 
 
 def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
-    """Return the number of realisations that have different lines: all of them, or one if the line is not random."""
+    """Return the number of distinct lines: the number of realisations, or 1 if the line is not random."""
     return len(block.realisations) if setting.roughness.is_random else 1
 
 
@@ -154,14 +160,14 @@ def operations(block: Block[SlidingFriction]) -> float:
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # computing a line costs as much as about ten sweeps; the sweeps of a case count half, because most of them are
-        # on coarser grids
+        # Computing a line costs as much as about ten sweeps. The sweeps of a case count half, because most sweeps are
+        # on coarser grids.
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e5 + OPERATIONS_A_NODE * nodes
 
 
 def memory(block: Block[SlidingFriction]) -> float:
-    """Return the estimated peak memory of a block in bytes: one line on the finest grid that is usually needed."""
+    """Return the estimated peak memory of a block in bytes, for one line on the finest grid that is usually needed."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, _ in _groups(block, problems):
         grid = case.oversampling

@@ -1,4 +1,4 @@
-"""Solve a block of cases: friction after a jump of the velocity, or under a loading history.
+"""Solution of a block of cases: friction after a jump of the velocity, or under a loading history.
 
 Jumps of a plane Kelvin body are solved by marching the indentation depth in time. All other jumps and histories are
 solved from the motion of every element of the viscoelastic foundation.
@@ -42,8 +42,9 @@ from mdr_dask.physics.transients.elements.loading_history import Piece, Trace, t
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-OPERATIONS_MARCHED = 20  # operations of a jump, divided by the number of nodes and by the number of steps per decade
-# operations for one element in one time step of a history: without modes of the solid, and for each mode
+OPERATIONS_MARCHED = 20  # operations of a jump, divided by the number of nodes and the number of time steps per decade
+# Operations for one element in one time step of a history. The first number is for a solid without modes, and the
+# second number is added for each mode.
 OPERATIONS_FOLLOWED, OPERATIONS_A_MODE = 300, 25
 
 #: Names of the outputs for which errors are estimated.
@@ -59,7 +60,10 @@ TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 @dataclass(frozen=True)
 class _Found:
-    """The dimensionless outputs of several cases, and their errors. Friction is divided by h / L, and depth by h."""
+    """The dimensionless outputs of several cases, and the errors.
+
+    Friction is divided by h / L. Depth is divided by h.
+    """
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
@@ -123,7 +127,7 @@ class _Group:
 
     @property
     def largest_loads(self) -> FloatArray:
-        """F_N / (4 G_inf L h) of each case; for a history, the largest value during the history."""
+        """Largest value of F_N / (4 G_inf L h) in each case."""
         return self.problems.loads[self.members]
 
     @property
@@ -132,11 +136,14 @@ class _Group:
         raise NotImplementedError
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the cases on one realisation of the roughness; also return the number of solved cases."""
+        """Solve the cases on one realisation of the roughness. Return the outputs and the number of solved cases."""
         raise NotImplementedError
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Solve realisation number r of the block and write its results; return the number of solved cases."""
+        """Solve the realisation with the index r in the block and write the results.
+
+        Return the number of solved cases.
+        """
         members = self.members
         height, length = self.problems.height[members], self.problems.length[members]
         try:
@@ -221,7 +228,7 @@ class _Marched(_Group):
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Loads and Deborah numbers of the different cases, and the index of every case among the different cases."""
+        """Loads and Deborah numbers of the distinct cases, and for every case its index among the distinct cases."""
         before = self.problems.deborah[self.members]
         change = self.block.numbers("velocity_change")[self.members]
         after, loads = before * (1 + change), self.problems.loads[self.members]
@@ -243,7 +250,7 @@ class _Followed(_Group):
             values = [friction[None], np.array([found.after]), found.depth[None], np.array([found.contact])]
             return Solution(values, np.array([found.outcome], np.int8))
 
-        # if a depth is below the rms height, which is 1 here, its error is divided by the rms height
+        # The error of a depth below the rms height is divided by the rms height, which is 1 here.
         refined = refine(solve, 1, grids, 0.0, order=2, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
@@ -260,7 +267,7 @@ class _Followed(_Group):
 
     @cached_property
     def _history(self) -> tuple[Foundation, tuple[float, float], list[Piece]]:
-        """The solid, velocity and load before the history, and the pieces of the history, in dimensionless form."""
+        """Dimensionless form of the solid, of velocity and load before t = 0, and of the pieces of the history."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
@@ -271,7 +278,7 @@ class _Followed(_Group):
         return elements, (before / velocity, load / force), [piece.scaled(unit, velocity, force) for piece in history]
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a coarser grid: for example, if `every` is 4, on every fourth node."""
+        """Compute the case on a coarser grid. If `every` is 4, the grid has every fourth node of the finest grid."""
         elements, before, history = self._history
         nodes = waves.points * self.oversampling
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
@@ -297,7 +304,7 @@ def _check_rough(roughness: Roughness) -> None:
 
 
 def distinct(block: Block[VelocityJump]) -> int:
-    """Return the number of solutions of a block: the number of different cases times the number of realisations."""
+    """Return the number of solutions of a block: the number of distinct cases times the number of realisations."""
     different = 0
     for group in _groups(block, sliding_problems(block)):
         different += group.different[0].size if isinstance(group, _Marched) else 1
