@@ -173,7 +173,7 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve, the widest first, so that one discontinuity does not use up all values."""
+    """Return the intervals to halve, the widest first. One discontinuity therefore does not use up all values."""
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
     chosen = []

@@ -125,8 +125,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p): exponents or logarithms of factors. `left` returns data minus law. If
     scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the residuals.
-    These fits make the intervals wider. A constant is NaN if `undetermined` marks the constant from the derivatives at
-    the fitted or at the `stated` constants.
+    These fits make the intervals wider. A constant is NaN if `undetermined` marks the constant, given the derivatives
+    at the fitted constants or those at the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)

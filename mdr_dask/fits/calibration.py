@@ -40,8 +40,8 @@ class Calibration:
     """The result of a calibration.
 
     `noises` are the possible measurement errors, and `units` the units of unknowns, conditions and output. If the
-    measurement errors in the table do not explain the residuals, `contradicted` contains the residuals, and the
-    posterior uses larger measurement errors, so that the intervals include the misfit.
+    measurement errors in the table do not explain the residuals, `contradicted` contains the residuals. The posterior
+    then uses larger measurement errors, and the intervals include the misfit.
     """
 
     measured: Measured

@@ -82,7 +82,7 @@ class Table(NamedTuple):
         return bootstrap.with_errors(bootstrap.means(self.values[used].T), self.mean_error(used))
 
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the logarithms of the means of the `used` cases.
+        """Return the logarithms of the means of the `used` cases, as a stack.
 
         An infinite discretisation error counts as 100 % of the mean.
         """
@@ -138,7 +138,7 @@ def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
     """Return a sentence on whether data follow a power law with a stated exponent; the factor is fitted.
 
-    `x` and `logs` are logarithms of the abscissa and of the data (a stack).
+    `x` contains the logarithms of the abscissa, and `logs` is a stack of logarithms of the data.
     """
     rest = logs - power * x
     free = power_law(x, logs, count).constants[:, 0]

@@ -177,7 +177,8 @@ def columns_to_use(
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
     """Return which vertical factors suit these columns; columns are recognised by name or unit.
 
-    Unless the abscissa is a time or a frequency and the group is a temperature, the kind is ``none``.
+    The kind is ``none`` unless two conditions are met: the abscissa is a time or a frequency, and the group is a
+    temperature.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:

@@ -1,7 +1,7 @@
 """Fit the laws of steady sliding friction (thesis eqs. 3.11 to 3.18) to a store.
 
-Symbols: mu is the coefficient of friction, F_N the normal force, and v the velocity. The line has the length L and the
-rms height h. The body has the shear modulus G and the relaxation time tau.
+Symbols: mu is the coefficient of friction, F_N is the normal force, and v is the velocity. The line has the length L
+and the rms height h. The body has the shear modulus G and the relaxation time tau.
 
 Friction against velocity has four regions. Friction is proportional to the velocity in region I, grows more slowly in
 region II, is at its plateau in region III, and falls in region IV. The load has two zones. In zone 1, at low loads, the

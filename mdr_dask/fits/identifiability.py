@@ -1,4 +1,4 @@
-"""Find which unknowns of a calibration the data determine, and which products of powers of the other unknowns."""
+"""Find which unknowns of a calibration the data determine, and which products of powers of the remaining unknowns."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
 
 
 def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Return the share of the variance of unknown `k` that a quadratic function of the unknowns `by` explains."""
+    """Return which fraction of the variance of unknown `k` a quadratic function of the unknowns `by` explains."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)

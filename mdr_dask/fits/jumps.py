@@ -1,4 +1,4 @@
-"""The size and the law of the jump of friction that a jump of the velocity causes (thesis eqs. 4.8 to 4.11).
+"""Size and law of the friction jump that a velocity jump causes (thesis eqs. 4.8 to 4.11).
 
 Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
 the jump and mu_2 long after the jump. The coefficient of friction changes by d_mu_0 at t_0, and then relaxes from
@@ -56,7 +56,7 @@ NUMBERS = {
 
 
 def is_jump(data: xr.Dataset) -> bool:
-    """Return whether the loading history of every case of a series is a jump of the velocity."""
+    """Return whether the loading history is a velocity jump in every case of a series."""
     varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
     history = json.loads(data.attrs.get("parameters", "{}")).get("protocol") or {}
     return not varied and history.get("shape", "jump") == "jump"
@@ -228,7 +228,7 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
         count,
     )
     line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    # by how much the means of zeta and xi change when the data are shifted by their deviations from these means
+    # by how much the means of zeta and xi change when zeta and xi are shifted by the deviations from these means
     moved = scale * (flat.constants[len(both) :] - flat.constants[0])
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
     with np.errstate(divide="ignore", invalid="ignore"):  # the zeta of a resampled row may be zero

@@ -286,7 +286,7 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the shift factors and the constants of their laws, but not the merged curve."""
+    """Return the shift factors and the constants of the laws, without the merged curve."""
     curve = master_curve(friction_of_roughness(series))
     groups = curve.attrs["group"], curve.attrs.get("second", curve.attrs["group"])
     return curve[

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Relative difference up to which a measured and a computed value of a parameter count as equal. If the study has too
 #: few values for an interpolation, `AGREE` is used.
 SAME = 1e-6
-#: All cases use the same rough lines, so that a few modes represent the scatter of all cases. `MODES`: largest number
+#: All cases use the same rough lines. A few modes therefore represent the scatter of all cases. `MODES`: largest number
 #: of modes. `SHARE`: share of the variance that the modes must represent.
 MODES, SHARE = 6, 0.999
 

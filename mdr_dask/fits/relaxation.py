@@ -52,8 +52,8 @@ FIELDS = {
 class Relaxation(NamedTuple):
     """One exponential fitted to a trace. A trace is the mean of mu - mu_2 over realisations as a function of time.
 
-    `rate` is the stack of the fitted rate, and `integral_rate` the stack of the rate that follows from the integral of
-    the trace. `holds` is the verdict on the exponential.
+    `rate` is the stack of the fitted rate, and `integral_rate` is the stack of the rate that follows from the integral
+    of the trace. `holds` is the verdict on the exponential.
     """
 
     rate: FloatArray

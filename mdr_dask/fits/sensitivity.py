@@ -172,7 +172,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half widths of the intervals from `parts`: each item was computed without one part of the data."""
+    """Return the half widths of intervals from `parts`; each item was computed without one part of the data."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error

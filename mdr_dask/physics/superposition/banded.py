@@ -145,7 +145,7 @@ def _factorise(
 
 @jit
 def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
-    """Add the contribution of the prior of the second differences to the band of the precision matrix."""
+    """Add the prior precision of the second differences to the band of the precision matrix."""
     second = (1.0, -2.0, 1.0)
     for j in range(stiffness.size):
         for a in range(3):
@@ -157,7 +157,7 @@ def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
 def _add_points(
     first: IntArray, value: FloatArray, y: FloatArray, weight: float, band: FloatArray, right: FloatArray
 ) -> None:
-    """Add the contributions of the points of a channel to the band and the right side of the channel."""
+    """Add the points of a channel to the band and to the right-hand side of the channel."""
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):
@@ -178,7 +178,7 @@ def _add_ties(
     corner: FloatArray,
     right: FloatArray,
 ) -> None:
-    """Add the contributions of the points of a channel to the border, the corner and the right side of the offsets."""
+    """Add the points of a channel to the border, to the corner and to the right-hand side of the offsets."""
     for p in range(first.size):
         k = member[p]
         corner[k, 0] += weight
@@ -205,7 +205,7 @@ def _select(
     rough: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Compute the entries of the covariance matrix that the results in `Linear` need, and then these results."""
+    """Compute the results in `Linear` and the entries of the covariance matrix that these results need."""
     rows, channels, splines, offsets = border.shape
     begin = channels * splines
     within = np.empty((splines, ORDER))  # the band of the covariance of a channel

@@ -175,7 +175,7 @@ def superpose(
 
 
 def known_rise(kelvin: FloatArray, vertical: Vertical) -> FloatArray:
-    """Return log10(b_T) for a modulus, log10(1 / b_T) for a compliance, and otherwise 0.
+    """Return log10(b_T) for a modulus, log10(1 / b_T) for a compliance, and 0 for other kinds of `vertical`.
 
     The reference temperature T0 of b_T is the first temperature.
     """

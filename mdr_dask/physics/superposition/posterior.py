@@ -128,7 +128,7 @@ _SLOPES = _VALUES.derivative()
 
 @dataclass(frozen=True)
 class Solved:
-    """For each row of parameters: the density, and the distribution of the spline coefficients and offsets.
+    """Density of the parameters, and distribution of the spline coefficients and offsets, for each row of parameters.
 
     `energy` is the negative logarithm of the density, up to a constant. `mean` contains the mean coefficients of the
     splines, channel by channel, then the offsets; `factors` are the Cholesky factors of the precision matrix of these
@@ -204,7 +204,7 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
 
 
 def step_precision(count: int) -> FloatArray:
-    """Return the prior precision of the shifts, in units of the width of a curve, of all curves except the first."""
+    """Return the prior precision of the shifts of all curves except the first. Shifts are in widths of a curve."""
     steps = np.eye(count - 1) - np.eye(count - 1, k=-1)
     covariance = STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2
     return np.asarray(steps.T @ np.linalg.inv(covariance) @ steps, dtype=np.float64)

@@ -122,6 +122,6 @@ def _split(
 
 
 def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return an order of the curves: by `second`, then by `first`, alternately ascending and descending."""
+    """Return the indices of the curves, sorted by `second`, then by `first` (alternately ascending and descending)."""
     along = np.where(second % 2 == 0, first, first.max() - first)
     return np.lexsort((along, second))

@@ -57,7 +57,7 @@ class Spectrum:
         return density
 
     def line(self, length: float, modes: int) -> FloatArray:
-        """Return the amplitudes A_k, m, of the harmonics q_k = 2 pi k / L of the MDR line of the length L.
+        """Return the amplitudes A_k, m, of the harmonics q_k = 2 pi k / L for an MDR line with the length L.
 
         A_k = 2 sqrt(C1D(q_k) 2 pi / L), with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height of the
         surface, and its rms slope equals the rms gradient of the surface.
