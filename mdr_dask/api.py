@@ -1,4 +1,4 @@
-"""Write the reference of the public functions from their docstrings: ``python -m mdr_dask.api > docs/api.md``."""
+"""Write the reference of the public functions from docstrings: ``python -m mdr_dask.api > docs/api.md``."""
 
 from __future__ import annotations
 

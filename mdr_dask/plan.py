@@ -194,7 +194,7 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The costs of the first round of a campaign, as ``run --dry-run`` prints them.
+    """The costs of the first round of a campaign. ``run --dry-run`` prints these costs.
 
     `operations` is None if the model does not count operations. `growth` is the factor by which adaptive axes can
     increase the number of cases.

@@ -144,10 +144,10 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     Returns
     -------
     Dataset or DataTree
-        The outputs, with units and errors, and ``status``. The dimensions of these arrays are the axes and
-        ``realisation``. A
-        campaign with series gives a DataTree with a node for each series. An array is read when it is first used. The
-        attribute ``complete`` is False as long as results are missing. Means are then taken over the available results.
+        The outputs, with units and errors, and ``status``. The axes and ``realisation`` are dimensions of these arrays.
+        A campaign with series gives a DataTree with a node for each series. An array is read at the first use of the
+        array. The attribute ``complete`` is False as long as results are missing. Means are then taken over the
+        available results.
 
     Raises
     ------

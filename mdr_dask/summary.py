@@ -49,7 +49,7 @@ def require_answers(campaign: Campaign) -> None:
 
 
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
-    """Yield the axes of each series, notes about its data, and its costs, line by line."""
+    """Yield the axes of each series, and the notes and costs of the campaign, line by line."""
     written = written_units(campaign.text)
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)

@@ -304,7 +304,7 @@ def kind() -> str:
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit the libraries for linear algebra to one thread, so that results do not depend on the number of threads."""
+    """Limit the libraries for linear algebra to one thread, because results could depend on the number of threads."""
     import scipy.linalg  # noqa: F401  (loads the BLAS library of SciPy, which must be loaded before it can be limited)
     from threadpoolctl import threadpool_limits
 

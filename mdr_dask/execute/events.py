@@ -1,4 +1,4 @@
-"""Events and progress of a run, for its log and for the terminal."""
+"""Events and progress of a run, for the log of the run and for the terminal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Event:
     name: str
     # Details, as values that JSON can represent.
     facts: Mapping[str, Any] = field(default_factory=dict)
-    # A message for the user; empty for an event that is only written to the log.
+    # A message for the user. The message is empty for an event that is only written to the log.
     sentence: str = ""
 
 
@@ -56,7 +56,7 @@ class Progress:
     kept_failed: int = 0
     # Number of results of this run that are done but have a warning.
     warned: int = 0
-    # Number of blocks and number of solutions that this run has computed. Results may share a solution.
+    # Number of blocks and number of solutions that this run has computed. Several results may share a solution.
     blocks: int = 0
     solves: int = 0
     # Number of operations of all rounds that have begun, and of the finished blocks.

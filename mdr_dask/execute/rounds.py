@@ -1,7 +1,7 @@
 """Run a campaign stage after stage and round after round, until no result is missing in the store.
 
-A stage is the campaign with the values that its adaptive axes have so far. The first round of a stage computes the
-first realisations of all cases. Further rounds add realisations to cases whose errors are too large. The stored results
+A stage is the campaign with the present values of all adaptive axes. The first round of a stage computes the first
+realisations of all cases. Further rounds add realisations to cases whose errors are too large. The stored results
 determine the next stage and round. A run can therefore be stopped and repeated at any time.
 """
 
@@ -53,7 +53,7 @@ class _Round:
     # Masks for each group. `asked`: cases of the stage. `needed`: cases that need the realisations of this round.
     asked: list[BoolArray]
     needed: list[BoolArray]
-    # Index of the first realisation of the round, and index of its last realisation plus 1.
+    # Index of the first realisation of the round, and index of the last realisation of the round plus 1.
     realisations: tuple[int, int]
     # For each group, the number of realisations of each case after the round.
     taken: tuple[IntArray, ...]
@@ -112,7 +112,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
     """Return how many results of a campaign are in the store and how many results are missing.
 
     The count includes the first round of every stage up to the first unfinished stage. If outputs have tolerances for
-    their standard errors, only the first stage is counted.
+    standard errors, only the first stage is counted.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least

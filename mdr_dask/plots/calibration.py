@@ -89,7 +89,7 @@ def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Po
 
 
 def _along(found: fit.Calibration, x: Axis, points: Points, data: xr.Dataset) -> FloatArray:
-    """Return the positions of points on the horizontal axis; without a condition, points are numbered from 1."""
+    """Return the positions of points on the horizontal axis. Without a condition, the positions are 1, 2, 3, ..."""
     if not x.quantity:
         return np.asarray(points, dtype=np.float64) + 1
     along: FloatArray = labels.quantity(x.quantity, data[x.quantity]).of(found.measured.conditions[x.quantity][points])

@@ -17,7 +17,7 @@ from mdr_dask.plots.figure import Bar, Key, Mean
 
 
 class Curve(NamedTuple):
-    """The data of one curve, with its label, colour, line and marker."""
+    """The data, label, colour, line and marker of one curve."""
 
     data: xr.Dataset
     label: str
@@ -44,7 +44,7 @@ class Family(NamedTuple):
 
 
 def mean(data: xr.Dataset, output: str) -> Mean:
-    """Return the mean of an output over realisations and its 95 % interval, in the unit of the figure."""
+    """Return the mean of an output over realisations and the 95 % interval of the mean, in the unit of the figure."""
     values = data[output]
     if "realisation" not in values.dims:
         values = values.expand_dims("realisation")
@@ -83,7 +83,7 @@ def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
 
 
 def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
-    """Return the parameters that change along a dimension: one parameter for an axis, several for a sampled design."""
+    """Return the parameters that change along a dimension. In a sampled design, several parameters change."""
     names = [str(name) for name, values in data.coords.items() if values.dims == (dim,)]
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     return sorted(names or [dim], key=lambda name: axes.index(name) if name in axes else -1)
@@ -225,7 +225,7 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return one label for each of the dimensions `dims`, with the values of its parameters in a part of the series."""
+    """Return one label for each of the dimensions `dims`. A label shows the parameters along one dimension."""
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -260,8 +260,7 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     """Return a text with the fixed parameters, for a title.
 
-    The text begins with the parameters that are axes of the study. Other parameters are left out if they have no
-    symbol.
+    The text begins with the parameters that are axes of the study. Other parameters without a symbol are left out.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]

@@ -84,7 +84,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
 
 
 def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
-    """Return the friction of one curve: before the history starts, just after its start, and during the history."""
+    """Return the friction of one curve: before the history starts, just after the start, and during the history."""
     before = curves.mean(case, BEFORE)
     at_once = case.assign({JUMP: (case[BEFORE] + case[JUMP]).assign_attrs(case[JUMP].attrs)})
     errors = [aggregation.companion(case, name) for name in (BEFORE, JUMP)]

@@ -56,7 +56,7 @@ def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _channels(curve: xr.Dataset) -> dict[str, str]:
-    """Return names and markers of the ordinates. A master curve has one ordinate, or two that were shifted together."""
+    """Return names and markers of the ordinates. A master curve has one ordinate, or two ordinates shifted together."""
     return {name: marker for name, marker in (("ordinate", "."), ("companion", "x")) if f"curve_{name}" in curve}
 
 
@@ -105,7 +105,7 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
 
 
 def _lines(curve: xr.Dataset, channel: str) -> list[Trace]:
-    """Return the traces of a merged curve: its band, the dashed curve, and the solid part measured in the reference
+    """Return the traces of a merged curve: the band, the dashed curve, and the solid part measured in the reference
     condition.
     """
     x, y = curve["curve_abscissa"].values, curve[f"curve_{channel}"].values

@@ -138,7 +138,7 @@ def _on(axis: Axis, places: FloatArray) -> np.ndarray:
 
 
 def _points(panel: Panel, measured: Measured, data: xr.Dataset) -> xr.Dataset:
-    """Return all measured points, with their 95 % intervals, in the units of a panel."""
+    """Return all measured points, with 95 % intervals, in the units of a panel."""
     x = labels.quantity(panel.x.quantity, data[panel.x.quantity]).of(measured.conditions[panel.x.quantity])
     how, values = labels.quantity(measured.output, data[measured.output]), measured.values
     half = np.full(values.size, np.nan) if measured.errors is None else HALF * measured.errors

@@ -13,7 +13,7 @@ from typing import Any
 from mdr_dask.errors import DataError, similar
 from mdr_dask.units import to_si
 
-#: Sizes of letters and lines, in points, for a figure that is printed at its requested size, without scaling.
+#: Sizes of letters and lines, in points, for a figure that is printed at the requested size, without scaling.
 LETTERS: dict[Any, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,

@@ -61,7 +61,7 @@ def table_beside(path: str | Path) -> Path:
 
 
 def render(description: Figure) -> Drawn:
-    """Draw a figure with matplotlib and return it."""
+    """Draw a figure with matplotlib and return the drawn figure."""
     panels, asked = description.panels, page.current()
     rows, columns = _grid(description)
     width = asked.width or max(6.4, 4.2 * columns)
@@ -160,7 +160,7 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Set the ticks of a logarithmic axis. If the axis spans less than two decades, the numbers at its ticks are plain,
+    """Set the ticks of a logarithmic axis. If the axis spans less than two decades, the numbers at the ticks are plain,
     such as 1, 2, 5, 10, 20 and 50.
     """
     from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter
@@ -252,7 +252,7 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
 
 
 def _title(figure: Drawn, description: Figure) -> float:
-    """Write the title and return its height in inches. If a size is requested, write only a title from the user."""
+    """Write the title and return the height in inches. If a size is requested, write only a title from the user."""
     asked = page.current()
     if asked.title is not None or asked.width is not None:
         lines = [asked.title] if asked.title else []
@@ -304,8 +304,8 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels and return its height in inches. If a size is requested, the legend takes at
-    most a third of the height, and the last entries are left out if necessary.
+    """Draw one legend below all panels and return the height of the legend in inches. If a size is requested, the
+    legend takes at most a third of the height, and the last entries are left out if necessary.
     """
     width, asked = figure.get_figwidth(), page.current()
     most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 3

@@ -14,7 +14,7 @@ APART = 0.25
 
 
 def sensitivity(indices: xr.Dataset) -> Figure:
-    """Draw the Sobol indices of every input, as `mdr_dask.fits.sensitivity` returns them."""
+    """Draw the Sobol indices of every input. `mdr_dask.fits.sensitivity` computes these indices."""
     inputs = [str(name) for name in indices["parameter"].to_numpy()]
     ticks = [(float(k), name.replace("_", " ")) for k, name in enumerate(inputs)]
     y = Axis("", ticks=ticks, low=-0.6, high=len(inputs) - 0.4, reverse=True)

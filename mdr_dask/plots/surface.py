@@ -23,11 +23,11 @@ METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
-    """Draw the power spectrum C2D of every file with its power law, and the spectra of lines.
+    """Draw the power spectrum C2D of every file, the power law of every file, and the spectra of lines.
 
     There are two kinds of lines: straight cuts through the surface, and the lines that represent the surface in a
-    campaign. `spectra` are the spectra that a campaign uses: they contain only wave numbers between the cut-offs, and
-    no noise.
+    campaign. `spectra` are the spectra that a campaign uses. These spectra contain only wave numbers between the
+    cut-offs, and no noise.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
     densities = np.concatenate([report.bins.density[report.bins.density > 0] for report in reports])

@@ -24,8 +24,8 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 MOST_PANELS, LONGEST_WORD = 6, 20
 #: In a figure of main effects: largest number of parameters, and largest number of cases that are drawn as points.
 MOST_EFFECTS, MOST_POINTS = 12, 5000
-#: `MARKS`: marks for cases without a value. `SOME`: mark for cases whose mean may be biased, because some of their
-#: realisations failed.
+#: `MARKS`: marks for cases without a value. `SOME`: mark for a case with failed realisations, because the mean may then
+#: be biased.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -290,7 +290,7 @@ def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[li
     """Divide the curves of a figure into panels. Also return texts about what is left out.
 
     With `View.panels`, each value of this parameter has a panel. With `View.apart`, each curve has a panel. Otherwise
-    there is one panel, or one for each series if one panel would have more curves than colours.
+    there is one panel, or one panel for each series if a common panel would have more curves than colours.
     """
     if view.panels:
         return _by_value(found, view)
@@ -329,7 +329,7 @@ def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]
 
 
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
-    """Draw one panel: the curves of all its series, the laws for these curves, and marks for the cases without a
+    """Draw one panel: the curves of all series in the panel, laws for these curves, and marks for cases without a
     value.
     """
     panel = Panel(x, Axis(""), title=part.title, bar=next(iter(families.values())).bar)
@@ -365,7 +365,7 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
 
 
 def _families(series: Mapping[str, xr.Dataset], view: View, output: str) -> dict[str, curves.Family]:
-    """Return the curves of all series of a panel, in different colours."""
+    """Return the curves of all series of a panel. Curves of two series never have the same colour."""
     found: dict[str, curves.Family] = {}
     first = 0
     for name, data in series.items():
@@ -505,8 +505,8 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Sort the n cases of a sampled study by one parameter, divide them into sqrt(n) groups, and return the means of
-    the groups.
+    """Sort the n cases of a sampled study by one parameter, divide the cases into sqrt(n) groups, and return the means
+    of the groups.
     """
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)

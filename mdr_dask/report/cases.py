@@ -59,7 +59,7 @@ def _series(name: str, data: xr.Dataset, left_out: list[str]) -> Json:
 
 
 def main_outputs(data: xr.Dataset) -> list[str]:
-    """Return the outputs of a series without their errors (`<output>_error`)."""
+    """Return the outputs of a series that are not errors of other outputs (`<output>_error`)."""
     names = [str(name) for name in data.data_vars if name != "status"]
     errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
     return [name for name in names if name not in errors]

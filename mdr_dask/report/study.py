@@ -1,4 +1,4 @@
-"""The content of a page about one study, read from its store."""
+"""The content of a page about one study, read from the store of the study."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Study:
     are failures and warnings. Messages that differ only in numbers form one group. `not_fitted` are the laws that
     cannot be fitted, with reasons. `not_drawn` are the figures that cannot be drawn, with reasons. The module
     `mdr_dask.report.figures` makes the data in `figures`, and `mdr_dask.report.cases` makes the data in `cases`.
-    `rerun` are commands that compute the study again, and `at_work` names the runs that are computing it now.
+    `rerun` are commands that compute the study again. `at_work` names the runs that are now computing the study.
     """
 
     url: str
@@ -179,7 +179,7 @@ def _count_table(counted: list[Json]) -> Table:
 
 
 def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield three tables of a series: its axes, its fixed parameters, and its outputs."""
+    """Yield three tables of a series: the axes, the fixed parameters, and the outputs."""
     of = f" of {name}" if name else ""
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
     varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]

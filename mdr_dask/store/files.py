@@ -30,13 +30,13 @@ ROOT = "-"
 CLAIMS = ".claims/"
 #: Folder with the record of the layout (`mdr_dask.store.integrity`).
 RECORD_FOLDER = ".layout"
-#: Names of the files that a study may contain if its first run was stopped before the study was laid out.
+#: Names of the files that a study may contain if the first run was stopped before the study was laid out.
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server: enough to hide the time until the server answers.
 AT_ONCE = 64
 #: Time in s after which a request fails if the server has not answered.
 LONGEST_REQUEST = 120.0
-#: Number of threads that flush files to the disk; a block has about ten files.
+#: Number of threads that flush files to the disk. A block has about ten files.
 FLUSHERS = 8
 #: Version of the layout. Stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
@@ -88,7 +88,7 @@ def absolute(url: str) -> str:
 
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
-    """Turn errors of the file system or the network into a StoreError whose message is one sentence."""
+    """Turn errors of the file system or the network into a StoreError with a message of one sentence."""
     try:
         yield
     except MdrDaskError:
@@ -161,8 +161,8 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages. Every file is replaced in one step, after all files of the earlier stages.
 
-    On a disk, all files are first written under temporary names and flushed. Files of the last stage get their final
-    names after the final names of the earlier stages have been flushed.
+    On a disk, all files are first written under temporary names and flushed. Files of the last stage are renamed only
+    after the renaming of all earlier files has reached the disk.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -216,7 +216,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its missing parents; return the folders to flush."""
+    """Make a folder and the missing parents of the folder. Return the folders to flush."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]

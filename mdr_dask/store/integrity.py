@@ -33,7 +33,7 @@ class LayoutRecord:
 
 
 def read_record(url: str) -> LayoutRecord | None:
-    """Return the record of the layout, or None if it is missing or damaged."""
+    """Return the record of the layout, or None if the record is missing or damaged."""
     content = read_bytes(url, RECORD)
     try:
         held = parsed(content or b"{}")["attributes"]

@@ -172,7 +172,7 @@ def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _arrays_and_coordinates(template: Template) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Return the metadata of the arrays of a group, and the chunks of its coordinates."""
+    """Return the metadata of the arrays of a group, and the chunks of the coordinates of the group."""
     coordinates = _coordinates(template)
     files: dict[str, Any] = {}
     store = zarr.storage.MemoryStore(files)

@@ -1,4 +1,4 @@
-"""Read the ledger of a group (the array ``status``), and find the chunks of its blocks."""
+"""Read the ledger of a group (the array ``status``), and find the chunks of the blocks of the group."""
 
 from __future__ import annotations
 

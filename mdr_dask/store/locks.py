@@ -1,9 +1,9 @@
 """Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
-If the file system has locks, the operating system releases them when a process ends. On other file systems, and at
-URLs, a run makes a claim. To make a claim, the run creates a file that only one process can create, and then regularly
-writes a second file as a sign of life. A run also holds a lock named the gate while it searches for active runs or lays
-out the study.
+If the file system has locks, the operating system releases the locks of a process when the process ends. On other file
+systems, and at URLs, a run makes a claim. To make a claim, the run creates a file that only one process can create, and
+then regularly writes a second file as a sign of life. A run also holds a lock named the gate while it searches for
+active runs or lays out the study.
 """
 
 from __future__ import annotations
@@ -126,9 +126,9 @@ def exclusive(url: str) -> Iterator[Lock]:
 
 @contextmanager
 def shared(url: str, part: Part) -> Iterator[Lock]:
-    """Lock one part of a study; the other parts may run at the same time.
+    """Lock one part of a study. The other parts may run at the same time.
 
-    Raise StoreBusyError if this part, the whole study, or a part of a division into another number of parts is running.
+    Raise StoreBusyError if another process runs this part, the whole study, or a part with another `count`.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -183,7 +183,7 @@ def _ranges(numbers: list[int]) -> str:
 
 @contextmanager
 def acquire(url: str, name: str = "") -> Iterator[Lock]:
-    """Hold the lock with the given name until the context ends; raise StoreBusyError if another process holds it.
+    """Hold the lock with the given name until the context ends; raise StoreBusyError if another process has this lock.
 
     An empty name stands for the exclusive lock. If the store is read-only, the lock has no owner and allows only
     reading.
@@ -270,7 +270,7 @@ def _locked(file: Path) -> int:
 
 
 def _flock(descriptor: int, shared: bool = False) -> None:
-    """Acquire a lock of the operating system, or raise BlockingIOError if another process holds it."""
+    """Acquire a lock of the operating system, or raise BlockingIOError if another process holds the lock."""
     if fcntl is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)

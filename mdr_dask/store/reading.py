@@ -22,13 +22,13 @@ from mdr_dask.store.study import series_names
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Groups larger than this, in bytes, are read through Dask, because they may not fit into memory.
+#: Groups with more than this number of bytes are read through Dask, because large groups may not fit into memory.
 LAZY_BYTES = 2**30
 
 
 @contextmanager
 def readable(url: str) -> Iterator[None]:
-    """Turn the errors that Zarr raises for unreadable chunks into a StoreError whose message is one sentence."""
+    """Turn the errors that Zarr raises for unreadable chunks into a StoreError with a message of one sentence."""
     try:
         yield
     except Exception as error:

@@ -110,7 +110,7 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 def merge_records(url: str, series: str) -> None:
     """Merge record files of single blocks into files with many records, if the blocks are in the ledger.
 
-    A record can be in two files if a process is killed while it merges files, or if two processes merge files.
+    A record can be in two files if a process is killed while merging, or if two processes merge the same files.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

@@ -1,4 +1,4 @@
-"""Find out whether there is a study at a path or URL, and read its metadata."""
+"""Find out whether there is a study at a path or URL, and read the metadata of the study."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _root_attributes(url: str) -> dict[str, Any] | None:
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:
-    """Return whether a study with these attributes was never laid out, because its first run was stopped."""
+    """Return whether a study with these attributes was never laid out, because the first run was stopped."""
     return list(found) == ["mdr_dask_layout"]
 
 

@@ -1,4 +1,4 @@
-"""Compare a store with the digests in its records, and repair it."""
+"""Compare a store with the digests in the records of blocks, and repair the store."""
 
 from __future__ import annotations
 
@@ -78,8 +78,8 @@ def verify(url: str) -> Inspection:
 def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Damaged metadata are written again. Damaged coordinates, blocks and records are removed, and the next run writes
-    them again. Foreign files are removed only from the folders of chunks and records.
+    Damaged metadata are written again. Damaged coordinates, blocks and records are removed. The next run writes the
+    removed files again. Foreign files are removed only from the folders of chunks and records.
     """
     refuse_file(url)
     with exclusive(url):
