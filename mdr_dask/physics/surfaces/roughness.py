@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -74,8 +76,15 @@ def phases(seed: int, realisation: int, modes: int) -> FloatArray:
 
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
-    """Return exp(i phi_k) for the phases of a realisation, shape (modes,)."""
+    """Return exp(i phi_k) for the phases of a realisation, shape (modes,); cached."""
+    # the number of modes is rounded up to a power of two, so that similar lines use the same entry of the cache
+    return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
+
+
+@lru_cache(maxsize=8)  # eight entries, enough for the powers of two within a factor of 128
+def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
+    factors.flags.writeable = False
     return factors
 
 
