@@ -34,7 +34,7 @@ COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.ar
 #: Environment variables that limit libraries for linear algebra to one thread if they are set before the import.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 #: A child process is killed if a block takes this time in s longer than the sum of the time limits of its results. A
-#: case in plain Python normally raises TimeoutError before, at the time limit of the case.
+#: case in plain Python normally raises TimeoutError earlier, at the time limit of the case.
 GRACE = 1.0
 #: If this number of realisations of a case have crashed, the other realisations of the case are marked as failed and
 #: are not computed.

@@ -36,7 +36,7 @@ class Plot:
     fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
-        """Return the figure as data, with the numbers of results that failed or are missing."""
+        """Return the figure as data, and count the results that failed or are missing."""
         try:
             with page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
                 figure = self.draw({name: _squeezed(data) for name, data in groups.items()})
@@ -67,7 +67,7 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
 
 
 def _without_value(states: Sequence[xr.DataArray]) -> list[str]:
-    """Return up to three texts: the numbers of results that failed, that did not converge, and that are missing."""
+    """Return up to three texts: how many results failed, how many did not converge, and how many are missing."""
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in reasons.items()}

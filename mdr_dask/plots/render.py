@@ -85,7 +85,7 @@ def render(description: Figure) -> Drawn:
 
 
 def _grid(description: Figure) -> tuple[int, int]:
-    """Return the numbers of rows and columns of panels.
+    """Return the number of rows and the number of columns of panels.
 
     On a screen, there are up to three columns. If a width is requested, a column of panels is about as wide as a column
     of a journal. If the rows would then not fit on a page, there are up to twice as many columns.

@@ -242,7 +242,7 @@ def _lock_file(url: str, name: str = "") -> Path:
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, or a null character
+    except (OSError, RuntimeError, ValueError) as error:  # the path is a link to itself, or has a null character
         raise StoreError(f"{url}: expected a path: {error}") from None
     return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
 

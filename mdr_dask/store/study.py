@@ -89,7 +89,7 @@ def refuse_file(url: str, expected: str = "the folder of a store") -> None:
 
 
 def exists(url: str) -> bool:
-    """Return whether there is a study at a path or URL; raise StoreError if a file or another folder is there."""
+    """Return whether there is a study at a path or URL; raise StoreError for a file or a folder with other files."""
     refuse_file(url, "the folder of a store or nothing")
     path, found = local(url), _root_attributes(url)
     if found is None and path is not None and path.is_dir():
