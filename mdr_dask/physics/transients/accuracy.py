@@ -2,9 +2,9 @@
 
 The steady states before and after a jump, and the drag just after the jump, are solved on finer and finer grids
 (:mod:`mdr_dask.physics.refine`). The march is computed on one grid only. From drag and depth in the march, the steady
-values on the same grid are subtracted, and the accurate steady values are added. The transient is therefore accurate
-even if it is much smaller than the friction. The error of the transient is estimated by a second march with half as
-many nodes and half as many steps.
+values on the same grid are subtracted, and the accurate steady values are added. A transient is therefore accurate even
+if the friction is much larger. The error of the transient is estimated by a second march with half as many nodes and
+half as many time steps.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Levels(NamedTuple):
 
     @classmethod
     def of(cls, limits: list[SteadyLimits]) -> Levels:
-        """Return the quantities of all cases, from the steady limits of each case."""
+        """Return the levels of all cases, given the steady limits of every case."""
         rows = [(each.before, each.at - each.before, each.after, each.depth[1]) for each in limits]
         return cls(*np.array(rows).reshape(-1, 4).T)
 
@@ -43,9 +43,9 @@ class Jumps(NamedTuple):
     """Results of the velocity jumps on a line.
 
     Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height. `trace`
-    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute; the errors of
-    `trace` and `depth` are NaN if not requested. `contact` is the fraction of the line in contact in steady sliding,
-    before or after the jump, whichever is larger.
+    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute. `trace_error`
+    and `depth_error` are NaN if these errors were not requested. `contact` is the larger of two fractions of the line:
+    the fraction in contact in steady sliding before the jump, and the fraction after it.
     """
 
     levels: Levels
@@ -70,10 +70,11 @@ def solve_jumps(
     """Solve the velocity jumps on a line.
 
     Loads are F_N / (4 G L h), where h is the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2
-    tau / L. `accuracy` is the allowed relative error; the error of a depth smaller than h is divided by h. If
-    `accuracy` is None, the steady states are solved on the grid of the march only, and no errors can be requested. The
-    march uses `oversampling` (an even number) nodes per Nyquist point, and the steady states at least as many. If
-    `march` is None, the transient is not computed; if `with_errors` is True, its error is estimated.
+    tau / L. `accuracy` is the allowed relative error of the steady values. The error of a depth smaller than h is
+    divided by h, not by the depth. If `accuracy` is None, the steady states are solved on the grid of the march only,
+    and `with_errors` must be False. `oversampling` is the number of nodes per Nyquist point in the march, and must be
+    even. The steady states use at least as many nodes. If `march` is None, no transient is computed. If `with_errors`
+    is True, the errors of the transients are estimated.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -93,7 +94,7 @@ def solve_jumps(
     while accuracy is not None and (grids[-1] < grid or 2 * grids[-1] <= FINEST):
         grids.append(2 * grids[-1])
     floors = [0.0, 0.0, 0.0, 1.0]
-    # a contact of a few nodes converges irregularly, at second order or faster; the safety factor is therefore doubled
+    # a contact of a few nodes converges irregularly, at second order or faster, hence twice the usual safety factor
     refined = refine(solve, cases, grids, accuracy or np.inf, order=2, safety=2 * SAFETY, floors=floors)
     levels = Levels(*refined.values)
     errors = Levels(*refined.errors if accuracy is not None else np.full((4, cases), np.nan))
@@ -122,7 +123,7 @@ def solve_jumps(
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the neglected changes of drag and depth as the errors of a jump that was not marched."""
+    """Return the errors of drag and depth for a jump that was not marched. The errors are the neglected changes."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -130,7 +131,7 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest changes of drag and depth between fine and coarse grid, from each of the times to the end."""
+    """Return the largest differences of drag and depth between the two grids at or after each of `times`."""
     if coarse is None:
         return np.full((2, times.size), np.inf)
     everywhere = np.union1d(times, fine.time)

@@ -1,14 +1,15 @@
-"""Find the contact patches at one instant after a velocity jump.
+"""Search for the contact patches at one instant after a velocity jump.
 
-The search visits the cells of the line in the direction in which the elements move, from the highest point on. The
+The search starts at the highest point of the line and visits the cells in the direction in which the elements move. The
 force on an element in contact is lift + h + D h'. Here h is the height of the line, the Deborah number D is the
 distance v tau in cells, and the lift is the sum of the depth and the rate of the depth. Contact ends where the force
 falls through zero, or where free elements arrive with a displacement larger than the depth plus the height of the line.
-Contact begins where the line rises above the free elements and the force would be positive. Most cells are skipped
-because of bounds (`_skip_pressed`, `_skip_free`); the bounds are rigorous, so that no contact is missed.
+Contact begins where the line rises above the free elements and the force would be positive. Most cells are skipped,
+because rigorous bounds show that contact neither begins nor ends there (`_skip_pressed`, `_skip_free`).
 
-Free elements may pass the highest point without contact and travel more than a whole period of the line. If this is
-possible, the search is repeated with the elements that separated from the line in the previous period.
+Free elements may pass the highest point without contact and travel more than a whole period of the line. If the motion
+since the jump allows free elements to do so, the search is repeated with the elements that separated from the line in
+the previous period.
 """
 
 from __future__ import annotations
@@ -57,15 +58,15 @@ from mdr_dask.physics.transients.patches import (
 
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
-VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
-LEFT_LIMITS = -1  # outcome if a patch extends beyond its run of cells, or if there are too many patches
+VISITS = 6  # largest number of changes of contact in a cell, as a cubic force changes sign at most three times
+LEFT_LIMITS = -1  # outcome if a patch extends beyond a run of cells, or there are too many patches
 
 # Entries of `Workspace.scan`, the state of the search
 (
     BEGIN,  # place where the current patch begins
-    FREE_FROM,  # place where contact or a positive force last ended
-    HELD,  # place up to which contact is certain
-    FIRM_LIFT,  # cells in contact can be skipped if their barrier is below this lift
+    FREE_FROM,  # place where contact last ended, or where the force last fell to zero
+    HELD,  # place up to which the current patch is certainly in contact
+    FIRM_LIFT,  # a cell in contact can be skipped if the barrier of the cell is below this lift
     FIRM_UNTIL,  # place up to which `FIRM_LIFT` is valid
     LOWEST,  # least displacement of free elements at the end of the previous cell
 ) = range(6)
@@ -83,7 +84,7 @@ class Reachable(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Work arrays of a search, and the results: the patches, and the sums over the patches with their derivatives.
+    """Work arrays and results of a search: `start` and `end` of every patch, and the `sums` over all patches.
 
     The barriers of the cells belong to the Deborah number after the jump. `free_until` contains, for each cell, the
     largest depth at which the cell is certainly out of contact.
@@ -99,7 +100,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> Workspace:
-    """Return a workspace for up to 4 `patches` + 4096 patches."""
+    """Return a workspace for at most 4 p + 4096 contact patches, where p is `patches`."""
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
     earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
@@ -111,9 +112,9 @@ class Motion(NamedTuple):
     """Changes of the depth and of the lift from the jump until now.
 
     `rise` is the largest mean rate at which the lift has increased from any earlier instant until now. `fall` is the
-    largest rate at which the lift has decreased from one time step to the next. `deepest` is the largest depth and
-    `highest` the largest lift so far. `passes_top` is True if free elements may have passed the highest point of the
-    line without contact.
+    largest rate at which the lift has decreased from one time step to the next. `deepest` is the largest depth so far,
+    and `highest` is the largest lift so far. `passes_top` is True if free elements may have passed the highest point of
+    the line without contact.
     """
 
     rise: float
@@ -124,7 +125,7 @@ class Motion(NamedTuple):
 
 
 class Search(NamedTuple):
-    """Constants and work arrays of a search; the line has n cells."""
+    """Constants and work arrays of a search on a line of n cells."""
 
     now: Instant
     motion: Motion
@@ -135,12 +136,12 @@ class Search(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Cell i of the line, with the coefficients of the cubic that is the height of the line.
+    """Cell i of the line. `line` contains the coefficients of the cubic that is the height of the line in this cell.
 
-    `stop` is the end of the cell, or of the period if the period ends in this cell. `pressed` is True if the force on
-    elements in contact would be positive everywhere in the cell; `weak` is True if this force may have been negative at
-    an earlier instant. `separated` is True if elements may have separated in the cell although the force is positive
-    now.
+    `stop` is the end of the cell, or the end of the period if the period ends in this cell. `pressed` is True if the
+    force on elements in contact would be positive everywhere in the cell. `weak` is True if this force may have been
+    negative at an earlier instant. `separated` is True if elements may have separated in the cell although the force is
+    positive now.
     """
 
     i: int
@@ -153,7 +154,7 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at the last instant of the history; return their number, or `LEFT_LIMITS`.
+    """Find the contact patches at the last instant of the history. Return the number of patches, or `LEFT_LIMITS`.
 
     The patches and the sums over the patches are written to the workspace.
     """
@@ -205,13 +206,13 @@ def _motion_until(now: Instant, second: float) -> Motion:
 
 @jit_uncounted
 def _search_period(search: Search, runs: IntArray) -> int:
-    """Search one period of the line; return the number of patches, or `LEFT_LIMITS`."""
+    """Find the patches in one period of the line. Return the number of patches, or `LEFT_LIMITS`."""
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
     sums[:] = 0.0
     scan[BEGIN] = scan[FREE_FROM] = scan[HELD] = origin
     scan[FIRM_UNTIL] = scan[LOWEST] = 0.0
-    # at the highest point, elements may be free since the previous period, or since before the jump
+    # at the highest point, elements may have been free since the previous period, or since before the jump
     contact, found = search.depth >= displacement_at(now, work.recovery, origin)[0], 0
     if not contact:
         _add_separation(search, origin)
@@ -246,10 +247,10 @@ def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
 
 @jit_inline_uncounted
 def _skip_pressed(search: Search, i: int, stop: int) -> int:
-    """Search from cell i on, and return the first cell in which contact may end or elements may have separated.
+    """Return the first cell from i to `stop` in which contact may end or elements may have separated.
 
-    A cell is skipped if no element has separated in the cell, and if the displacement u of free elements stays below
-    w = depth + h. Along the line u' = (drift - u) / D (see `free_recovery`), so that u stays below w wherever w + D h'
+    A cell is skipped if no element has separated in the cell, and if the displacement u of free elements stays below w
+    = depth + h. Along the line u' = (drift - u) / D (see `free_recovery`). Therefore u stays below w wherever w + D h'
     exceeds the largest drift.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
@@ -271,11 +272,11 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _skip_free(search: Search, i: int, stop: int) -> int:
-    """Search from cell i on, and return the first cell in which contact may begin.
+    """Return the first cell from i to `stop` in which contact may begin.
 
     A cell is skipped if the gap between free elements and line is too wide to have opened since the elements separated.
-    The gap follows from a lower bound of the displacement: the last known displacement, decayed towards the least
-    drift.
+    The gap is computed from a lower bound of the displacement. This bound begins with the last known displacement and
+    decays towards the least drift.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, lift = now.track, work.recovery.bounds, search.lift
@@ -296,7 +297,7 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
-    """Return whether the elements in a cell certainly had a gap to the line since they separated beyond `oldest`."""
+    """Return whether elements that separated at or beyond `oldest` have certainly stayed free up to the given cell."""
     opened = search.work.recovery.bounds.opened
     return gap > 0 and gap > opened[window(2 * (cell + 1 - oldest))]
 
@@ -305,7 +306,8 @@ def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
 def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, int]:
     """Find where contact begins and ends in cell i.
 
-    Return whether there is contact at the end of the cell, and the number of patches found so far, or `LEFT_LIMITS`.
+    Return whether there is contact at the end of the cell, and the number of patches found so far. If the work arrays
+    are full, `LEFT_LIMITS` replaces this number.
     """
     now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
     track, barriers = now.track, work.barriers
@@ -374,7 +376,7 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
 
 @jit_inline_uncounted
 def _overtaking(search: Search, held: float, x: float, w: float) -> float:
-    """Return the displacement at x of free elements that may arrive inside a patch, or 0 if no such element exists.
+    """Return the displacement of free elements that may arrive at x inside a patch, or 0 if no free element can arrive.
 
     An element in contact at x has the displacement w. The patch is certainly in contact up to `held`, and no element of
     the patch has separated between `held` and x.
@@ -405,18 +407,19 @@ def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
 
 @jit_inline_uncounted
 def _lowest_beyond(search: Search, u: float) -> float:
-    """Return the least displacement of free elements one cell beyond a place where their displacement is u."""
+    """Return the least displacement of free elements one cell beyond a place, given the displacement u at the place."""
     now, drift = search.now, search.work.recovery.bounds.least_drift[WINDOWS - 1]
     return float((u - drift) * np.exp(-1 / min(now.deborah, now.first.deborah)) + drift)
 
 
 @jit_inline_uncounted
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
-    """Return whether contact begins beyond x in a cell, and the place where contact begins or the search continues.
+    """Return True and the place where contact begins beyond x in a cell, or False and the place to continue the search.
 
     Contact can begin only between `low`, where the force becomes positive, and `high`, where the force falls to zero
     again. If contact does not begin, `high` is stored as a place of separation, because elements may have separated
-    there at an earlier instant. If `ended` is True, contact or a positive force has just ended at x.
+    there at an earlier instant. If `ended` is True, contact has just ended at x, or the force has just fallen to zero
+    at x.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
@@ -452,7 +455,8 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
 
 @jit_inline_uncounted
 def _add_edge(search: Search, place: float, steep: float, by_depth: float, opening: float) -> None:
-    """Add the changes of load and drag that are caused by the motion of an edge at which the force is not zero.
+    """Add to the sums the changes of load and drag that are due to the motion of an edge at which the force is not
+    zero.
 
     `steep` is the slope of the gap towards the inside of the patch. `by_depth` and `opening` are the derivatives of the
     gap with respect to depth and time.
@@ -486,7 +490,7 @@ def _add_separation(search: Search, place: float) -> None:
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add a cell to `recovery`: elements may have separated in it earlier, although the force is positive now."""
+    """Add to `recovery` a cell in which elements may have separated earlier, although the force is positive now."""
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1
@@ -499,7 +503,7 @@ def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
 
 @jit_inline_uncounted
 def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
-    """Return three Bernstein coefficients of the slope of the force in a cell; the slope lies between them."""
+    """Return three Bernstein coefficients of the slope of the force in a cell. The coefficients enclose the slope."""
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
     return enter, enter + bend, enter + 2 * bend + turn
@@ -507,7 +511,7 @@ def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, f
 
 @jit_inline_uncounted
 def _may_have_separated(search: Search, i: int) -> bool:
-    """Return whether elements may have separated in cell i or just before it, although the force is positive now."""
+    """Return whether elements may have separated in or just before cell i, although the force is positive now."""
     track, motion, deborah = search.now.track, search.motion, search.now.deborah
     start, middle, end = _force_slopes(track, deborah, i)
     if deborah * max(start, middle, end) <= -motion.rise:

@@ -1,17 +1,17 @@
 """The displacement of elements that recover freely after a velocity jump.
 
 An element that is now at x was at x' = x - D (t - t') at the time t', where the Deborah number D is the distance v tau
-in cells. The displacement of the element is the largest of the displacements that the line imposed on it earlier, each
-reduced by the decay since then:
+in cells. The line may have imposed displacements on this element at earlier times t', and every imposed displacement
+decays afterwards. The displacement of the element is the largest of the decayed displacements:
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
-This formula needs only the history of the depth d(t). The element separated from the line where the expression in the
-maximum is stationary; there, the force on the element was zero.
+This formula needs only the history of the depth d(t). A free element separated from the line at the time t' of the
+maximum, and the force on the element was zero then.
 
-The *drift* of free elements is D u' + u, where u' is the derivative along the line. The drift is equal to minus the
-rate of the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent
-past (`PathBounds`) limit how fast u can change along the line.
+The *drift* of free elements is D u' + u, where u' is the derivative along the line. The drift is -d'(t') exp(-(t -
+t')), where t' is the time of separation and d' is the rate of the depth. The extremes of the drift over the recent past
+(`PathBounds`) limit how fast u can change along the line.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Pa
 
 STRIDE = 2.0  # longest step towards a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
-# cells travelled in the shortest window; number of windows, each twice as long as the previous one
+# WINDOW: cells that the line travels in the shortest window; WINDOWS: number of windows, each twice the one before
 WINDOW, WINDOWS = 8.0, 16
 
 
 class Instant(NamedTuple):
-    """An instant after the jump: the line, the contact before the jump, and the depth and its rate up to this instant.
+    """An instant after the jump, with the line, the contact before the jump, and the history of the depth.
 
     `time` is the time since the jump, `deborah` belongs to the velocity after the jump, and `left` is exp(-time),
     the factor by which displacements have decayed since the jump.
@@ -49,10 +49,11 @@ class Instant(NamedTuple):
 class PathBounds(NamedTuple):
     """Bounds over windows of time that end now, shape (WINDOWS,) each.
 
-    During the shortest window the line travels `WINDOW` cells. Each further window is twice as long as the one before.
-    `spread` is the range of the depth, `opened` the largest increase of the gap between line and free elements at one
-    place, and `least_lift` the least sum of the depth and its rate. `most_drift` (at least 0) and `least_drift` (at
-    most 0) are the extreme drifts of elements that separated within the window or have been free since before the jump.
+    During the shortest window the line travels `WINDOW` cells. Each further window is twice as long as the previous
+    window. `spread` is the range of the depth. `opened` is the largest increase of the gap between line and free
+    elements at one place. `least_lift` is the smallest lift (depth plus rate of the depth). `most_drift` (at least 0)
+    and `least_drift` (at most 0) are the extreme drifts of elements that separated within the window or have been free
+    since before the jump.
     """
 
     spread: FloatArray
@@ -63,12 +64,12 @@ class PathBounds(NamedTuple):
 
 
 class FreeRecovery(NamedTuple):
-    """Places or stretches of the line where elements may have separated, in order along the line.
+    """Places and runs of cells where elements may have separated, in order along the line.
 
-    An entry is a place of separation if ``earliest == place``: the force on elements in contact is zero there now, and
-    at earlier instants since the jump it was zero somewhere between `place` and `farthest`. All other entries are
-    stretches: the force is positive now, but elements may have separated in the cells from `earliest` to `place`, at
-    times when the lift was below `barrier`.
+    An entry with ``earliest == place`` is a place of separation. The force on elements in contact is zero at `place`
+    now. At earlier instants since the jump, this force may have been zero anywhere between `place` and `farthest`.
+    Every other entry is a run of cells from `earliest` to `place`. The force is positive there now, but elements may
+    have separated there at times when the lift was below `barrier`.
     """
 
     earliest: FloatArray
@@ -81,7 +82,7 @@ class FreeRecovery(NamedTuple):
 
 @jit_inline_uncounted
 def write_bounds(history: History, first: Patches, deborah: float, bounds: PathBounds) -> None:
-    """Write the bounds at the last instant of a history."""
+    """Write the bounds over all windows that end at the last instant of a history."""
     last = history.count - 1
     time, depth, rate = history.time[last], history.depth[last], history.rate[last]
     left, back = np.exp(-time), last
@@ -112,7 +113,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the shortest window with a travel of more than `distance` cells, or of the longest window."""
+    """Return the index of the shortest window with more than `distance` cells of travel, or the last index."""
     return min(max(frexp(distance / WINDOW)[1], 0), WINDOWS - 1)
 
 
@@ -158,10 +159,11 @@ def _in_period(now: Instant, s: float) -> float:
 
 @jit_inline_uncounted
 def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
-    """Return displacement, slope and du/d(depth) of an element at x that separated near a place.
+    """Return the displacement u, du/dx and du/d(depth) of an element at x that separated near a place.
 
     The place of separation is between `place`, where the force vanishes now, and `farthest`, the farthest place where
-    the force has vanished since the jump. The returned displacement is -1 if the element did not separate there.
+    the force has vanished since the jump. If the element did not separate between these places, the returned
+    displacement is -1.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -197,9 +199,9 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
 
 @jit_uncounted
 def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
-    """Return the results of `_separated_near` for an element at x that separated anywhere in a stretch of cells.
+    """Return the results of `_separated_near` for an element at x that separated in the cells from `low` to `high`.
 
-    The search starts at the node of the stretch for which the displacement is largest.
+    The search starts at the node between `low` and `high` for which the displacement is largest.
     """
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
     low = max(low, x - now.deborah * now.time)
@@ -215,7 +217,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope and du/d(depth) of an element at x that separated at entry k of `recovery`."""
+    """Return the displacement u, du/dx and du/d(depth) of an element at x that separated at entry k of `recovery`."""
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0
@@ -225,9 +227,9 @@ def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> 
 
 @jit_inline_uncounted
 def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
-    """Return displacement and slope at x of elements that have been free since before the jump.
+    """Return the displacement u and du/dx at x of elements that have been free since before the jump.
 
-    If the displacement is at most `least`, both returned values may be 0.
+    If the displacement is at most `least`, the two returned values may be 0.
     """
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
     low = last_until(first.start, s, 0, first.start.size)
@@ -258,7 +260,7 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 
 @jit_inline_uncounted
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
-    """Return the gap at x, and its slope, curvature, derivative with respect to the depth, and rate.
+    """Return five values at x: the gap, and the slope, curvature, derivative by the depth and rate of the gap.
 
     The gap is depth + h - u, positive where the line is above free elements with the displacement u.
     """
@@ -317,7 +319,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove the places of separation from which elements at x certainly have displacements below `pressed`.
+    """Remove a place of separation if elements from this place certainly have displacements below `pressed` at x.
 
     `deepest` is the largest depth since the jump.
     """

@@ -28,13 +28,13 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-NEARLY = float(np.sqrt(np.finfo(float).eps))  # relative error of the load before the last Newton step, which squares it
+NEARLY = float(np.sqrt(np.finfo(float).eps))  # largest relative error of the load before the last Newton step
 
 
 class PreparedLine(NamedTuple):
     """One periodic line, prepared for the steady sweep and for the march.
 
-    `known` contains the :class:`Barriers` for up to two Deborah numbers, those before and after a jump.
+    `known` contains the :class:`Barriers` for at most two Deborah numbers, before and after a jump.
     """
 
     cells: Cells
@@ -44,7 +44,7 @@ class PreparedLine(NamedTuple):
 
     @classmethod
     def of(cls, line: CubicLine) -> PreparedLine:
-        """Prepare a line; the barriers are computed when they are needed."""
+        """Return a prepared line. Its barriers are computed later, when needed for the first time."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
@@ -57,7 +57,7 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the patches in steady sliding, and the sums of `sweep_cells`; `depth` is that of the highest point."""
+        """Return the steady patches and the sums of `sweep_cells`. `depth` is the depth of the highest point."""
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
@@ -72,8 +72,8 @@ class SteadyLimits(NamedTuple):
     jump, `rate` is the derivative of the depth with respect to t / tau, and `tilt` is the derivative of the drag with
     respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values, before and after the
     jump. `first` contains the contact patches before the jump, and `slower` the patches in steady sliding at the lower
-    of the two velocities; both are None if one of the two steady states was not found. `is_full` states whether the
-    whole line is in contact in both steady states.
+    of the two velocities. If one of the two steady states was not found, `first` and `slower` are None. `is_full`
+    states whether the whole line is in contact in both steady states.
     """
 
     before: float
@@ -94,11 +94,11 @@ def steady_limits(
 ) -> list[SteadyLimits]:
     """Solve the steady states before and after jumps on one line, and the states just after the jumps.
 
-    At the instant of a jump, displacements and depth do not change, but the rate of the depth changes, and elements
-    whose force would become negative separate.
+    At the instant of a jump, displacements and depth do not change, but the rate of the depth changes. Elements
+    separate if the force on them would become negative.
 
     Loads are F_N / (4 G L), in the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2 tau / L.
-    The guesses are depths at which the searches start; they do not affect the results.
+    `guesses` are depths at which the searches start. The guesses do not affect the results.
     """
     guess = None if guesses is None else guesses.ravel()
     steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)
@@ -120,7 +120,7 @@ def steady_limits(
         fast = float(deborah[k, 1] * n)
         at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
         slower, outcome = both[int(np.argmin(deborah[k]))], Outcome(end)
-        is_full = both[0].start.size == both[1].start.size == 1  # free elements are followed by a second patch
+        is_full = both[0].start.size == both[1].start.size == 1  # a second patch follows free elements
         found.append(
             SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], is_full, outcome)
         )
@@ -129,7 +129,7 @@ def steady_limits(
 
 @jit
 def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
-    """Return the displacements of elements at the ends of the patches."""
+    """Return the displacement of an element at the end of each patch."""
     pressed = np.empty(end.size)
     for k in range(end.size):
         pressed[k] = depth + height_at(track, end[k])[0]
@@ -140,7 +140,7 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
-    """Return the numbers `at`, `rate` and `tilt` of `SteadyLimits`, and the outcome."""
+    """Return `at`, `rate` and `tilt` of `SteadyLimits`, and the outcome."""
     rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):
         released(track, first, barriers, deborah, rate, sums)

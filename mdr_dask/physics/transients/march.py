@@ -34,7 +34,8 @@ class Marching(NamedTuple):
 
     `first` is the contact before the jump. `reachable` contains the cells where contact is possible at depths from
     `low` to `high`. `deborah` belongs to the velocity after the jump, and `load` is F_N / (4 G dx). The instants are
-    equidistant in log(1 + t / onset), with the spacing `pace`. Newton's method ends with a step of at most `close`.
+    equidistant in log(1 + t / onset), with the spacing `pace`. The last step of Newton's method changes the depth by at
+    most `close`.
     """
 
     track: Track
@@ -50,7 +51,7 @@ class Marching(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Time, depth and its rate, drag and its rate at every instant, from just after the jump on.
+    """Time, depth, rate of the depth, drag and rate of the drag at every instant, beginning just after the jump.
 
     Rates are derivatives with respect to t / tau.
     """
@@ -78,9 +79,9 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], work: Workspace
 ) -> tuple[int, float, float]:
-    """Find the depth at which the load is carried, at the last instant of the history, by Newton's method.
+    """Find the depth that carries the load at the last instant of the history by Newton's method.
 
-    Return the outcome (or `LEFT_LIMITS`), the drag, and its derivative with respect to t / tau.
+    Return the outcome (or `LEFT_LIMITS`), the drag, and the derivative of the drag with respect to t / tau.
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
@@ -116,7 +117,7 @@ def _balance(
 
 @jit_uncounted
 def _weights(marching: Marching, found: Trajectory, now: int) -> tuple[float, float]:
-    """Return the numbers a and b for which the rate of the depth d at instant `now` of a march is a d + b."""
+    """Return a and b in the formula a d + b for the rate of the depth d at the instant with the index `now`."""
     depth = found.depth
     if now == 1:  # from the known rate just after the jump
         taken = found.time[1]
@@ -129,7 +130,7 @@ def _weights(marching: Marching, found: Trajectory, now: int) -> tuple[float, fl
 
 @jit_uncounted
 def _extrapolated(found: Trajectory, now: int) -> float:
-    """Extrapolate the depth to instant `now` by a parabola in log(1 + t / onset), or in t for the first instants."""
+    """Return the depth at index `now`, extrapolated in log(1 + t / onset), or in t if `now` is 1 or 2."""
     time, depth, rate = found.time, found.depth, found.rate
     taken = time[now] - time[now - 1]
     if now == 1:
@@ -144,8 +145,8 @@ def _extrapolated(found: Trajectory, now: int) -> float:
 def march_depth(marching: Marching, found: Trajectory, work: Workspace) -> int:
     """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
-    `found` contains all times; the other quantities are known at the first instant, and written for later instants.
-    Return an `Outcome` or `LEFT_LIMITS`.
+    `found` contains all times. The other quantities in `found` are given at the first instant, and are written for all
+    later instants. Return an `Outcome` or `LEFT_LIMITS`.
     """
     time, depth, rate, drag, drag_rate = found
     for now in range(1, time.size):

@@ -1,8 +1,8 @@
 """Contact patches on a line, and the forces on them.
 
 The unit of length is a cell of the line, and slopes are rises per cell. Times are divided by the relaxation time. The
-Deborah number D is the distance v tau in cells. The lift is the sum of the depth and its rate, so that the force on an
-element in contact, divided by 4 G dx, is lift + h + D h'.
+Deborah number D is the distance v tau in cells. The lift is the sum of the depth and the rate of the depth. The force
+on an element in contact, divided by 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 NEWTON_STEPS = 60  # largest number of steps of Newton's method; as many bisections would reach machine precision
-CLOSE = 1e-2  # the last step towards an edge of contact, in cells, is smaller; the error is about the cube of this step
+CLOSE = 1e-2  # in cells; the last Newton step towards an edge of contact is shorter, and its cube is about the error
 # Entries of the sums over the patches; load and drag are divided by 4 G dx
 (
     LOAD,
@@ -37,11 +37,11 @@ Cubic = tuple[float, float, float, float]  # coefficients of the height of the l
 class Track(NamedTuple):
     """The cells of a periodic line, with integrals up to every node.
 
-    Heights at the n + 2 nodes are relative to the highest point, which avoids rounding errors in light contacts.
-    `enter` and `leave` are the slopes at the start and at the end of each cell, and `peak` is the largest height in the
-    cell; the last of the n + 1 cells repeats the first. `area` and `square` are the integrals of the height and of the
-    squared slope up to each node. `cells` is the length n of the line. The period begins at `origin`, the place of the
-    highest point in the first cell.
+    Heights at the n + 2 nodes are relative to the highest point, to avoid rounding errors in light contacts. `enter`
+    and `leave` are the slopes at the start and at the end of each cell, and `peak` is the largest height in each cell.
+    The last of the n + 1 cells is a copy of the first cell. `area` and `square` are the integrals of the height and of
+    the squared slope up to each node. `cells` is the length n of the line. The period begins at the highest point of
+    the line, which lies in the first cell at `origin`.
     """
 
     height: FloatArray
@@ -62,7 +62,7 @@ def track_of(cells: Cells) -> Track:
 
 
 class Patches(NamedTuple):
-    """Patches of a steady state, with the displacements `pressed` of elements at the ends of the patches."""
+    """Patches of a steady state. `pressed` is the displacement of an element at the end of each patch."""
 
     start: FloatArray
     end: FloatArray
@@ -72,7 +72,7 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """Depth and rate at `count` instants; `stiff` is the derivative of the last rate with respect to the last depth."""
+    """Depth and rate at `count` instants. `stiff` is the derivative of the last rate with respect to the last depth."""
 
     time: FloatArray
     depth: FloatArray
@@ -138,7 +138,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
         return NONE
     if not (begin >= near >= far >= end and begin > 0 >= end):
         return float(contact_end(p, q, r, c, 0.0, y))
-    # the Bernstein coefficients on [y, 1] decrease, and so does the cubic
+    # the Bernstein coefficients on [y, 1] decrease, and therefore the cubic decreases
     low, high, x = y, 1.0, y + width * begin / (begin - end)
     for _ in range(NEWTON_STEPS):
         value = p + x * (q + x * (r + x * c))
@@ -157,14 +157,14 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
 
 @jit_inline_uncounted
 def unloading(line: Cubic, lift: float, deborah: float, y: float) -> float:
-    """Search a cell from y on, and return the first place where `force_at` falls through 0, or `NONE`."""
+    """Return the first place from y to the end of a cell where `force_at` falls through 0, or `NONE`."""
     c0, c1, c2, c3 = line
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
 @jit_inline_uncounted
 def loading(line: Cubic, lift: float, deborah: float, y: float) -> float:
-    """Search a cell from y on, and return the first place where `force_at` rises through 0, or `NONE`."""
+    """Return the first place from y to the end of a cell where `force_at` rises through 0, or `NONE`."""
     c0, c1, c2, c3 = line
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
@@ -178,7 +178,7 @@ def force_at(line: Cubic, lift: float, deborah: float, y: float) -> float:
 
 @jit_inline_uncounted
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
-    """Return whether the contact force is positive everywhere in cell i."""
+    """Return whether the force on elements in contact would be positive everywhere in cell i."""
     block = np.uintp(i) // np.uintp(BLOCK)
     if np.isnan(barriers.block[block]):
         write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers)
@@ -189,8 +189,9 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces just after a jump, from the contact before the jump and the new rate of the depth.
 
-    Displacements and depth do not change at the jump; contact continues only where the force is positive at the new
-    velocity and rate. `deborah` and `barriers` are those after the jump. The results are written to `sums`.
+    Displacements and depth do not change at the jump. Contact continues only where the force is positive at the new
+    velocity and the new rate. `deborah` and `barriers` belong to the velocity after the jump. The results are written
+    to `sums`.
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)

@@ -1,7 +1,8 @@
 """Friction after a velocity jump at constant load, on one periodic line.
 
 The march (the sequence of time steps) starts from steady sliding at v_1 and ends when sliding is steady at v_2. The
-method is that of section 4.2 of the thesis, except that the velocity of the elements includes the rate of the depth.
+method is described in section 4.2 of the thesis. In contrast to the thesis, the velocity of the elements includes the
+rate of the depth.
 """
 
 from __future__ import annotations
@@ -19,18 +20,19 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-NEGLIGIBLE = 1e-5  # a smaller change of the steady depth is replaced by this fraction of the mean displacement
+NEGLIGIBLE = 1e-5  # the change of the steady depth is taken as at least this fraction of the mean displacement
 MEMORY = 7.0  # relaxation times until a march ends; the displacements at the jump have then decayed to less than 0.1 %
-STEEPEST = 3.0  # a cubic does not overshoot if its slopes are at most three times the secant (Fritsch and Carlson)
+STEEPEST = 3.0  # a cubic does not overshoot if both end slopes are at most 3 times the secant (Fritsch and Carlson)
 
 
 class MarchRequest(NamedTuple):
     """Requested times and accuracy of a march.
 
-    `times` are increasing times after the jump, (t - t_0) / tau. `wavenumber` is the largest wavenumber of the line
-    times its length, q_max L; it determines the first step. `per_decade` is the number of steps per factor of ten in
-    time. `accuracy` is the allowed error of the friction, divided by the steady friction after the jump. A transient
-    below this error is not marched. With ``accuracy = 0`` every transient is marched.
+    `times` are increasing times after the jump, (t - t_0) / tau. `wavenumber` is q_max L, the largest wavenumber of the
+    line times the length of the line. The first time step depends on `wavenumber`. `per_decade` is the number of time
+    steps per factor of ten in time. `accuracy` is the allowed error of the friction, divided by the steady friction
+    after the jump. A transient smaller than the allowed error is not marched. With ``accuracy = 0`` every transient is
+    marched.
     """
 
     times: FloatArray
@@ -40,7 +42,7 @@ class MarchRequest(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Drag and depth at the instants of a march, and their rates, shape (2, instants) each.
+    """Drag and depth at the instants of a march, and the rates of drag and depth, shape (2, instants) each.
 
     Times since the jump are divided by the relaxation time. The first rate of the drag is unknown and is NaN. `falls`
     is True if the velocity falls.
@@ -55,8 +57,8 @@ class Path(NamedTuple):
         """Return drag and depth at increasing times, shape (2, times).
 
         Between instants, drag and depth are cubic in log(1 + t / t_1), where t_1 is the first instant after the jump.
-        If the velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) at the
-        trailing edge of every patch. After the last instant, the result is the steady values in `after`.
+        If the velocity falls, contact grows as sqrt(t) at the trailing edge of every patch. In this case, t / t_1 is
+        replaced by sqrt(t / t_1). After the last instant, drag and depth are the steady values in `after`.
         """
         power = 0.5 if self.falls else 1.0
         passed, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -68,8 +70,9 @@ class Path(NamedTuple):
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
     """Interpolate curves by cubics with given slopes, and return the values at `places`.
 
-    Each row contains the points of one curve. If the first slope of a row is NaN, the first piece is a parabola. Where
-    a single asperity enters or leaves contact, the slope is reduced, so that the cubic does not overshoot.
+    Each row of `rows` contains the values of one curve at `x`. If the first slope of a row is NaN, the first piece is a
+    parabola. A slope is reduced if the cubic would overshoot, for example where a single asperity enters or leaves
+    contact.
     """
     secants = np.diff(rows) / np.diff(x)
     beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
@@ -89,8 +92,8 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
 class Jump(NamedTuple):
     """Drag F_x / (4 G L) and depth at the requested times after a velocity jump.
 
-    `path` is None if there was no march. `left_out` is the estimated size of a transient that was not marched because
-    it is smaller than the allowed error; otherwise 0.
+    `path` is None if there was no march. If a transient was not marched because it is smaller than the allowed error,
+    `left_out` is the estimated size of this transient. Otherwise `left_out` is 0.
     """
 
     trace: FloatArray
@@ -112,7 +115,7 @@ def jump_between(
         return _failed(times, limits.outcome)
     after, depth = np.full(times.size, limits.after), np.full(times.size, limits.depth[1])
     settled = Jump(after, depth, None, 0.0, limits.outcome)
-    if limits.is_full:  # in full contact u = d + h and the depth is constant: there is no transient
+    if limits.is_full:  # in full contact u = d + h and the depth is constant; therefore there is no transient
         return settled
     relaxation = _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request)
     transient = relaxation.transient() if request.accuracy > 0 else np.inf
@@ -134,7 +137,7 @@ def _failed(times: FloatArray, outcome: Outcome) -> Jump:
 
 
 class _Relaxation(NamedTuple):
-    """One jump: the line, the load, the two Deborah numbers, and the steady states; lengths are in cells."""
+    """One velocity jump: the line, the load, the two Deborah numbers and the steady states. Lengths are in cells."""
 
     line: PreparedLine
     load: float
@@ -150,7 +153,7 @@ class _Relaxation(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Change of the steady depth due to the jump; allowed errors of the depth are fractions of this change."""
+        """Change of the steady depth due to the jump. Allowed errors of the depth are fractions of this change."""
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
     def transient(self) -> float:
@@ -162,10 +165,10 @@ class _Relaxation(NamedTuple):
         return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
 
     def march(self) -> tuple[Marching, Trajectory, Workspace, Outcome]:
-        """March from one steady state to the next.
+        """Return the march from the steady state before the jump to the steady state after it, and the outcome.
 
-        The depth may leave the interval between the steady depths by the length of this interval. If the depth leaves
-        the interval by more, the march is repeated with a margin of 4, and then 16, times the length.
+        The depth may leave the interval between the two steady depths by a margin, which is the length of the interval.
+        If this margin is not sufficient, the march is repeated with 4 times and then with 16 times the margin.
         """
         for widening in (1, 4, 16):
             marching, found, work = self.begun(widening * self.change)
@@ -186,7 +189,7 @@ class _Relaxation(NamedTuple):
         assert limits.slower is not None
         before, after = self.deborah / line.track.cells
         onset = min(1.0, 1 / (request.wavenumber * max(after, before - after)))
-        if after < before:  # as contact grows as sqrt(t), the first step must not end after the first requested time
+        if after < before:  # contact grows as sqrt(t), and the first step must not end after the first requested time
             onset = min(onset, float(request.times[request.times > 0][0]) / (10 ** (1 / request.per_decade) - 1))
         until = min(request.times[-1], MEMORY)
         last = np.log1p(until / onset)
@@ -199,7 +202,7 @@ class _Relaxation(NamedTuple):
         runs, free_until = _runs(line.track, limits.slower, low, high)
         begin, end = int(np.ceil(limits.slower.end[0])), int(limits.slower.start[-1])
         reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
-        # with this bound, the error of Newton's method is of fourth order in the time step
+        # with this limit, the error of Newton's method is of fourth order in the time step
         close = self.change / request.per_decade**2
         marching = Marching(
             line.track, limits.first, reachable, self.deborah[1], self.load, low, high, onset, last / steps, close
@@ -209,7 +212,7 @@ class _Relaxation(NamedTuple):
 
 @jit
 def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntArray, FloatArray]:
-    """Return the first and last node of each run of cells where contact is possible at depths from `low` to `high`.
+    """Return the first and the last node of each run of cells where contact is possible at depths from `low` to `high`.
 
     Also return, for each cell, the largest depth at which the cell is certainly out of contact.
     """

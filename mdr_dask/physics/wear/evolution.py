@@ -1,7 +1,7 @@
 """Time integration of a worn contact with backward differentiation formulas (BDF) of order 1 to 3.
 
-The equations are stiff. The nodes move with the contact edge. In every step, Newton's method solves for the image and
-the position of the edge together.
+The equations are stiff. The nodes move with the contact edge. In every time step, Newton's method solves for the image
+and the position of the edge together.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from mdr_dask.physics.wear.slip import TOLERANCE, GrossSlip, Moment, PartialSlip
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
-MOST_STEPS = 20000  # a march with more steps fails, which limits the computing time
-MOST_ITERATIONS = 12  # Newton iterations of one step; a step that is short enough needs about three
-GROWTH = 1.8  # largest ratio of a step to the previous step: formulas of order 3 need a bound to be stable
+MOST_STEPS = 20000  # a march with more time steps fails, to limit the computing time
+MOST_ITERATIONS = 12  # largest number of Newton iterations in a time step; a sufficiently short step needs about three
+GROWTH = 1.8  # largest ratio of a time step to the previous one; without a limit, formulas of order 3 are unstable
 
 Problem = PartialSlip | GrossSlip
 
 
 class NotConvergedError(ArithmeticError):
-    """Raised if a time step fails even though it is very short."""
+    """Raised if a march needs too many time steps, or if even a very short time step fails."""
 
 
 def march(
@@ -39,10 +39,11 @@ def march(
     start: Moment | None = None,
     stops: Callable[[Any], bool] = lambda moment: False,
 ) -> list[Any]:
-    """Return the contact at the start and at the end of every accepted step.
+    """Return the contact at the start of the march, and the contact at the end of every accepted time step.
 
-    The last step ends at or beyond `end`, or at the first moment for which `stops` returns True. `tolerance` is the
-    error of `worn` of the problem that is allowed in one step, and `first` is the length of the first step.
+    The march ends with the first contact for which the time is at least `end`, or `stops` returns True. `tolerance` is
+    the error of the results of ``problem.worn`` that is allowed in one time step. `first` is the length of the first
+    time step.
     """
     newton = _Newton(problem)
     history = [settled(problem) if start is None else start]
@@ -62,7 +63,7 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as a solution of the discrete equations, so that the first step has no jump."""
+    """Return the virgin contact as a solution of the discrete equations, to avoid a jump in the first time step."""
     virgin: Any = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem).solve(virgin.unknowns, 0.0, known)
@@ -70,9 +71,9 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]:
-    """Return the number of moments in the history that are earlier than `time`, and the moment at this time.
+    """Return the number of contacts in the history before the given time, and the contact at this time.
 
-    If the history contains no moment at this time, it is computed by one or more additional steps.
+    If the history contains no contact at this time, the contact is computed by one or more additional time steps.
     """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
@@ -93,7 +94,7 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
-    """Return the integral of the `rates` over time, up to every moment, by the BDF formulas of the steps."""
+    """Return the time integral of `rates` up to every contact in the history, by the BDF formulas of the steps."""
     total = np.zeros(len(history))
     for number in range(1, len(history)):
         order = min(number, 3)
@@ -104,9 +105,10 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: float) -> tuple[Any, float]:
-    """Return the moment after one step of the highest possible order, and the error of the step.
+    """Return the contact after one time step by the BDF formula of the highest possible order, and the error of the
+    step.
 
-    If the step fails, the moment is None.
+    If the step fails, None is returned instead of the contact.
     """
     past = list(history[-1:-4:-1])
     order = len(past)
@@ -127,14 +129,14 @@ def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: f
 
 
 class _Newton:
-    """Newton's method with a Jacobian that is reused from step to step while the iteration converges."""
+    """Newton's method with a Jacobian that is reused in later time steps while the iteration converges."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.factors: Factors | None = None
 
     def solve(self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
-        """Return the unknowns of one step, or None if the iteration fails."""
+        """Return the unknowns of one time step, or None if the iteration fails."""
         if self.factors is not None:
             found = self._iterate(guess, theta, known)
             if found is not None:
@@ -145,7 +147,7 @@ class _Newton:
     def _iterate(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
     ) -> FloatArray | None:
-        """Return the solution, or None if the iteration fails or a reused Jacobian makes it slow."""
+        """Return the solution, or None if the iteration fails, or is slow because the Jacobian is reused."""
         is_reused, last = self.factors is not None, np.inf
         for _ in range(MOST_ITERATIONS):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
@@ -175,7 +177,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian; its columns for the unknowns that follow the image are finite differences."""
+        """Factorise the Jacobian, with finite differences in the columns of the unknowns that follow the image."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
@@ -187,7 +189,9 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return weights: the weighted sum of values at `times` is the derivative of their polynomial at times[0]."""
+    """Return weights. The weighted sum of values at `times` is the derivative at times[0] of the polynomial through
+    them.
+    """
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -200,7 +204,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return weights: the weighted sum of values at `times` is the value of their polynomial at `time`."""
+    """Return weights. The weighted sum of values at `times` is the value at `time` of the polynomial through them."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

@@ -1,6 +1,6 @@
 """Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force.
 
-The errors of a solution follow from its differences to two solutions with coarser panels and longer steps.
+The errors of a solution are estimated from the differences to two solutions with coarser panels and longer time steps.
 """
 
 from __future__ import annotations
@@ -34,21 +34,22 @@ from mdr_dask.physics.wear.worn import (
 )
 
 COARSEST = 2e-3  # largest `accuracy` that is used: coarser panels would not resolve the image of a steep body
-COARSEST_OF_MOVING = 3e-4  # the same under constant force, where longer steps could not follow the stick border
+COARSEST_OF_MOVING = 3e-4  # largest `accuracy` under constant force: longer steps could not follow the border
 #: If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
-#: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is then below the rounding error.
+#: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), and is then below the rounding error.
 ENDED = 1e4
 JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta in the panel next to the border exceeds this value
-ROUGHER = 4.0  # from each solution to the next coarser one, the error allowed in a step grows by this factor
-#: The stated error of a radius is at least this fraction of its change in the last time step. All solutions have
-#: this error, because a position that the edge passes within a step begins to wear only at the end of the step.
+ROUGHER = 4.0  # the error allowed in a time step grows by this factor from each solution to the next coarser solution
+#: The stated error of a radius is at least this fraction of the change of the radius in the last time step. All
+#: solutions have this error, because a position that the edge passes within a time step begins to wear only at the end
+#: of this step.
 EDGE = 0.2
 
 
 class Resolution(NamedTuple):
-    """Panels and steps for a given `accuracy`, the allowed error of the profile f divided by eta d0.
+    """Panels and time steps for a given `accuracy`, which is the allowed error of the profile f divided by eta d0.
 
-    `rougher` is 0 for the solution itself, and 1 or 2 for the coarser solutions from which its error is estimated.
+    `rougher` is 0 for the requested solution, and 1 or 2 for the coarser solutions that are used to estimate errors.
     """
 
     accuracy: float
@@ -56,12 +57,12 @@ class Resolution(NamedTuple):
 
     @property
     def step(self) -> float:
-        """The error allowed in a step."""
+        """The error allowed in a time step."""
         return 0.2 * self.accuracy * ROUGHER**self.rougher
 
     @property
     def flat(self) -> float:
-        """The rise (d - 1) / eta of the depth up to which the border is the stick border of the unworn body."""
+        """Limit of the rise (d - 1) / eta of the depth: below it, the stick border of the unworn body is used."""
         return self.step / BORDER_WEIGHT
 
     def panels(self, near: int) -> Panels:
@@ -102,15 +103,15 @@ def exact(
         Stick radius c of the virgin contact, between 0 and 1. A value of 0 means gross slip in one direction, with
         df/ds = p in the whole contact.
     amounts : sequence of float
-        Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0) after a length l; in any order. An
-        infinite value gives the limiting profile of partial slip.
+        Cycles N >= 0 in units of N0, or, in gross slip, s = k E* l / (sigma0 a0) for the sliding distances l. The
+        amounts may be in any order. An infinite value gives the limiting profile of partial slip.
     accuracy : float
-        Allowed error of f, divided by eta d0, which is the order of magnitude of the wear. Errors below 3e-6 are not
-        reached, because round-off accumulates over the steps.
+        Allowed error of f, divided by eta d0. The worn depth is of the order of eta d0. Errors below 3e-6 are not
+        reached, because round-off accumulates over the time steps.
     constant_force : bool
-        Whether to keep the force of the virgin contact instead of its depth.
+        Whether the force of the virgin contact is kept constant instead of the depth.
     errors : bool
-        Whether to estimate the errors; this about doubles the computing time.
+        Whether to estimate the errors. The estimate about doubles the computing time.
 
     Returns
     -------
@@ -141,7 +142,7 @@ def exact(
     found, rougher = solve(resolution), []
     if errors:
         rougher.append(solve(resolution._replace(rougher=1)))
-        # if this solution fails, the error is estimated from one coarser solution only
+        # if the second coarser solution fails, the error is estimated from the first coarser solution only
         with suppress(NotConvergedError):
             rougher.append(solve(resolution._replace(rougher=2)))
     contacts = {
@@ -152,15 +153,16 @@ def exact(
 
 
 def operations(accuracy: float, *, constant_force: bool) -> float:
-    """Return the approximate number of operations in partial slip: n^3 for each time step with n nodes."""
+    """Return the approximate number of operations in partial slip, with n^3 operations per time step for n nodes."""
     resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force else COARSEST))
-    # steps that grow by the factor `GROWTH`, and steps that are limited by an error of third order
+    # number of time steps that grow by the factor `GROWTH`, plus number of time steps limited by an error of third
+    # order
     steps = float(np.log(1.0 / resolution.step) / np.log(GROWTH) + resolution.step**-0.25)
     return (2.0 if constant_force else 1.0) * steps * resolution.panels(5 if constant_force else 2).nodes.size ** 3
 
 
 class _Leg(NamedTuple):
-    """A part of an evolution, with one `problem`; `before` is the energy dissipated before this part, divided by mu."""
+    """A part of an evolution with one `problem`. `before` is the energy dissipated before this part, divided by mu."""
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
@@ -171,7 +173,7 @@ class _Leg(NamedTuple):
         return float(self.moments[-1].time)
 
     def at(self, time: float) -> tuple[Any, float, float]:
-        """Return the moment at a time, the dissipated energy divided by mu, and a lower limit of the radius error."""
+        """Return the contact at a time, the dissipated energy divided by mu, and the least error of the radius."""
         number, moment = at(self.problem, self.moments, time)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
@@ -182,7 +184,7 @@ class _Leg(NamedTuple):
 def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
-    """Return the contact after each wanted number of cycles; all are taken from the same solution."""
+    """Return the contact after each wanted number of cycles. All contacts are taken from the same solution."""
     c = max(_moved(profile, stick_radius, resolution.flat), stick_radius) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
@@ -226,7 +228,7 @@ def _fretted(
 
 
 def _moved(profile: Profile, c: float, rise: float) -> float:
-    """Return the stick border b after the virgin body is pressed deeper by rise * eta: g0(b) = g0(c) + rise * eta."""
+    """Return the stick border b of the virgin body pressed deeper by rise * eta, from g0(b) = g0(c) + rise * eta."""
     level = float(profile.image(np.array(c)))
     return profile.inside(level + rise * (1.0 - level))
 
@@ -246,7 +248,7 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
 def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
     """Return the radii that the stick border has passed, and the depth d1 (unit d0) at which it passed each radius.
 
-    Also return the slope of the image, d1 - eta at these radii, as a function of position.
+    At these radii the image is d1 - eta. The third result is the slope of this image as a function of position.
     """
     places, depths = rising(path)
     radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
@@ -260,10 +262,10 @@ def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
-    """Return the limiting profile of a contact whose stick border stops at `moment`.
+    """Return the limiting profile of a contact whose stick border no longer moves after `moment`.
 
-    In the end, the stick zone carries the whole force. Therefore, g = d = (F/2 + int_0^b g dx) / b beyond the border b.
-    The radius a of the scar is the root of int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
+    In the limit, the stick zone carries the whole force. Therefore g = d = (F/2 + int_0^b g dx) / b beyond the border
+    b. The radius a of the scar is the root of int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, (radii, reached, frozen_slope) = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
@@ -347,15 +349,15 @@ def _contact(leg: _Leg, time: float) -> Worn:
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return the ends of the pieces of integration from c to the border, densest where the image is steep."""
+    """Return the radii that divide an integral from c to the border, with small spacings where the image is steep."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
 
 
 def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
-    """Return the contact after each wanted sliding path; all are taken from the same solution."""
-    # near the axis, f ~ r^n = (r^2)^(n/2), so a body with n < 2 needs smaller panels there
+    """Return the contact after each wanted sliding distance. All contacts are taken from the same solution."""
+    # near the axis f ~ r^n = (r^2)^(n/2); a body with n < 2 needs smaller panels there
     near, far = profile.image(np.array([1e-5, 2e-5]))
     sharpness = max(2.0 / float(np.log2(far / near)), 1.0) if near > 0.0 else 1.0
     problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
@@ -366,7 +368,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
 
 def _slid_contact(leg: _Leg, path: float) -> Worn:
-    """Return the worn contact after one sliding path; outside the contact, its image is NaN."""
+    """Return the worn contact after one sliding distance. Outside the contact, the image is NaN."""
     problem, (moment, energy, edge_error) = leg.problem, leg.at(path)
     assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated

@@ -1,7 +1,8 @@
-"""Wear under blocks of different amplitude, depth or force; every block is a new problem of partial or gross slip.
+"""Wear under a sequence of load blocks, each with a constant amplitude and a constant depth or force.
 
 The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
-grid is uniform, because each load block leaves a kink or a jump in the image at another stick border.
+slip in a block is partial or gross. The grid is uniform, because every block leaves a kink or a jump in the image at
+the stick border of this block.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from mdr_dask.physics.wear.worn import Worn
 
 @dataclass(frozen=True)
 class LoadBlock:
-    """A number of cycles of constant amplitude, at constant `depth` (unit d0) or constant `force` (unit E* d0 a0).
+    """Load cycles of constant amplitude, at constant `depth` (unit d0) or constant `force` (unit E* d0 a0).
 
     `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is eta = G*
-    U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross; an infinite eta means sliding.
+    U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross. An infinite eta means sliding.
     """
 
     cycles: float
@@ -36,16 +37,16 @@ def history(
 ) -> list[Worn]:
     """Return the contact at the end of every block, worn from a virgin body with the contact radius 1 at depth 1.
 
-    The error is about proportional to the cell width, or, once the image has a jump, to the square root of the cell
-    width. `reach` is the largest radius of the grid in units of a0. If `errors` is True, the errors are estimated from
-    two more solutions, with 1/2 and 1/4 of the cells.
+    The error is about proportional to the cell width. After a block in which the image gets a jump, the error is about
+    proportional to the square root of the cell width. `reach` is the largest radius of the grid in units of a0. If
+    `errors` is True, the errors are estimated from two more solutions, with 1/2 and 1/4 of the cells.
     """
     length = min(reach, profile.largest_radius)
     fine, *rough = (
         _run(profile, blocks, uniform_grid(number, length))
         for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
     )
-    # at least half a cell, because two grids may agree by chance
+    # the stated errors of both radii are at least half a cell, because two grids may agree by chance
     least = dict.fromkeys(("contact_radius", "stick_border"), 0.5 * length / cells)
     return [replace(one, rougher=tuple(others), least_errors=least) for one, *others in zip(fine, *rough, strict=True)]
 
@@ -72,10 +73,10 @@ def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> li
 
 
 def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: LoadBlock) -> tuple[FloatArray, float]:
-    """Return the worn depth and the dissipated energy divided by mu after a block, by Heun's method."""
+    """Return the worn depth after a block, and the energy dissipated in the block divided by mu, by Heun's method."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
-        step = min(0.85 * grid.spacing, block.cycles - done)  # half of the largest stable step
+        step = min(0.85 * grid.spacing, block.cycles - done)  # in cycles; half of the largest stable step
         first = _state(grid, image_0 + grid.forward @ worn, block)
         rate = first.pressure * first.slip
         second = _state(grid, image_0 + grid.forward @ (worn + step * rate), block)
@@ -101,7 +102,7 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
 def _record(
     grid: UniformGrid, profile: Profile, worn: FloatArray, state: _State, block: LoadBlock, energy: float
 ) -> Worn:
-    """Return the worn contact at the end of a block; beyond the grid, the image is NaN and the pressure zero."""
+    """Return the worn contact at the end of a block. Beyond the grid, the image is NaN and the pressure is zero."""
     stuck = np.flatnonzero(state.depth - state.image < block.slip_share)
     k = int(stuck[0]) if stuck.size else 0
     border = 0.0

@@ -21,14 +21,14 @@ from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.worn import Scar, Worn, beyond_table, check_stick_radius, worn_by
 
 LAYER_GROWTH = 30.0  # ratio of the widths of successive pieces of integration at the stick border
-SCAR = 1e-10  # tolerance, over eta, of the integral that vanishes at the radius of the scar
-ERROR = 2e-6  # numerical error of every output divided by its largest value, without the error of the fast rule itself
+SCAR = 1e-10  # tolerance, divided by eta, of the integral that vanishes at the radius of the scar
+ERROR = 2e-6  # numerical error of every output, divided by the largest value; not the error of the fast rule
 EPS = float(np.finfo(np.float64).eps)
 _NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One case: virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), and `rest` = exp(-xi N / a(c))."""
+    """One case, with virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), and `rest` = exp(-xi N / a(c))."""
 
     image: Image
     c: float
@@ -55,7 +55,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:
-    """Return the limiting profile at constant depth; its image is g = g0 up to c, and g = 1 beyond c.
+    """Return the limiting profile at constant depth, with the image g = g0 up to c, and g = 1 beyond c.
 
     Examples
     --------
@@ -80,8 +80,8 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
     cycles : float
         Number of cycles N >= 0, in units of N0.
     xi : float
-        Factor xi in the exponent xi N / a(c) of the fast rule. The thesis fitted 0.8 by eye; the best factor lies
-        between 0.9 and 1.
+        Factor xi in the exponent xi N / a(c) of the fast rule. In the thesis, the factor 0.8 was fitted by eye. The
+        best factor lies between 0.9 and 1.
     """
     radius = limit_radius(profile, stick_radius)
     rest = max(math.exp(-xi * cycles / radius), EPS)  # a smaller value would be lost to rounding at the stick border
@@ -133,7 +133,7 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
 
     scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
     worn = worn_by(profile, scar, c, edge, 1.0, force, volume)
-    # the wear law gives the energy of the limiting profile; the fast rule does not determine the dissipated energy
+    # by the wear law, the energy of the limiting profile is known; the fast rule does not determine the energy
     energy = volume if rest == 0.0 else np.nan
     return replace(worn, energy_volume=energy, relative_error=ERROR)
 
@@ -214,10 +214,11 @@ def _angle(x: float, radius: float) -> float:
 def _scar_radius(
     rule: Rule, low: float, low_value: float, high: float, high_value: float, quadrature: Quadrature
 ) -> float:
-    """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is none.
+    """Return a radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is no such
+    radius.
 
-    `low_value` and `high_value` are the values of the integral at `low` and `high`. The method is the false position as
-    improved by Anderson and Björck.
+    `low_value` and `high_value` are the values of the integral at `low` and `high`. The root is found by the method of
+    false position with the improvement by Anderson and Björck.
     """
     if not high_value < 0.0 < low_value:
         return high
@@ -254,7 +255,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
 
 @jit
 def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force, and write the ends of the pieces of integration to `quadrature`."""
+    """Return scar radius, volume and normal force. Write the ends of the pieces of integration to `quadrature`."""
     abscissa, weight, cuts = quadrature
     _put_cuts(rule, cuts)
     radius = limit
@@ -287,7 +288,7 @@ def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> floa
 
 @jit
 def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
-    """Return scar radius, volume and force of limiting profiles; the rows of `cases` are n and c."""
+    """Return scar radius, volume and force of limiting profiles. The rows of `cases` are n and c."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         rule = _power_rule(no_table, cases[0, k], cases[1, k], 0.0)
@@ -298,7 +299,7 @@ def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> Float
 
 @jit
 def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
-    """Return scar radius, volume and force by the fast rule; the rows of `cases` are n, c, N, xi and a(c)."""
+    """Return scar radius, volume and force by the fast rule. The rows of `cases` are n, c, N, xi and a(c)."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]

@@ -1,7 +1,7 @@
 """The equations of one time step of partial slip and of gross slip, for `evolution.march`.
 
 In partial slip, squared radii are given as q = (r^2 - c^2) / (1 - c^2), depths as (d - 1) / eta, and worn depths are
-divided by eta. The unknowns are then of the order of one, even near full stick.
+divided by eta. With these definitions, the unknowns are of the order of one even near full stick.
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 
 TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # tolerance and step of the finite differences of Newton's method
-#: Weight of the stick border in the error of a step, relative to the weight of the depth: f rises like a square root
-#: beyond the border.
+#: Weight of the stick border in the error of a time step, relative to the weight of the depth. The weight is large
+#: because f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
 _ABSCISSA, _WEIGHT = gauss(3)
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """The contact at one `time`, which is the number of cycles N in partial slip and the sliding path s in gross slip.
+    """The contact at one `time`: the number of cycles N in partial slip, or the sliding distance s in gross slip.
 
     `unknowns`, all of the order of one, begin with the image at all nodes except the last. The unknown after the image
-    is the difference of r^2 between the edge and the inner border, divided by its value in the virgin contact. The
-    other unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
+    is the difference of r^2 between the edge and the inner border, divided by the value of this difference in the
+    virgin contact. The other unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is
+    zero at the edge.
     """
 
     time: float
@@ -68,13 +69,13 @@ class Place(NamedTuple):
 
 
 class Past(NamedTuple):
-    """Past moments, the newest first; `shares` are the weights of the moments in the BDF formula of one step.
+    """Past contacts, the newest first. `shares` are the weights of these contacts in the BDF formula of one time step.
 
-    `worn`, shape (moments, nodes), holds the worn depths while the stick border moves; `frozen` is then NaN. If the
-    border no longer moves, `frozen` is the worn depth at the border, and `worn` holds (worn depth - frozen) / sqrt(z)
-    with the position z on the panels. At constant depth (`is_growth`), `worn` holds ln(s / s0), because s grows
-    exponentially from a very small s0. `path` and `moved` are those of the newest moment (see `SlipMoment`), and
-    `carried` is the result of `PartialSlip.carried`.
+    `worn` has the shape (contacts, nodes). While the stick border moves, `worn` contains the worn depths, and `frozen`
+    is NaN. If the border no longer moves, `frozen` is the worn depth at the border, and `worn` contains (worn depth -
+    frozen) / sqrt(z), where z is the position on the panels. At constant depth (`is_growth`), `worn` contains ln(s /
+    s0), because s grows exponentially from a very small s0. `path` and `moved` belong to the newest contact (see
+    `SlipMoment`), and `carried` is the result of `PartialSlip.carried`.
     """
 
     shares: FloatArray
@@ -92,8 +93,9 @@ class Past(NamedTuple):
 class SlipMoment(Moment):
     """A contact in partial slip at one time.
 
-    `path`, shape (2, k), holds the stick border and the depth at the moments at which the border moved; both vary
-    linearly in between. `moved` is the rise of f_star along the path (see `PartialSlip`) at the nodes.
+    `path`, shape (2, k), contains the stick border and the depth at the start, and after every time step in which the
+    border moved. Between these points, the depth is a linear function of the border. `moved`, one value per node, is
+    the rise of f_star along the whole path (see `PartialSlip`).
     """
 
     path: FloatArray
@@ -105,15 +107,15 @@ class PartialSlip:
     """Slip s = (f - f_star) / eta outside the stick border b.
 
     If the border passes a radius when the depth is d1, the image there is g = d1 - eta from then on. At the depth d,
-    f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While the plateau
-    rises by dd, f_star rises by (2/pi) arccos(b / r) dd, so it is enough to store the path (b, d). At constant depth,
-    the border b stays at c. Under constant force, the border moves outwards until the image has a jump at the border.
+    f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While the plateau rises
+    by dd, f_star rises by (2/pi) arccos(b / r) dd. Therefore only the path (b, d) is stored. At constant depth, the
+    border b stays at c. Under constant force, the border moves outwards until the image has a jump at the border.
 
-    The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
-    Under constant force, the depth is a further unknown. As long as the border moves, the last unknown is the border.
-    `load` is half of the force on the virgin slip zone, divided by eta; at constant depth, it is None. If the border
-    does not move, `border` is the value of q at the border, and `frozen` is the worn depth there. If the border moves,
-    `border` is None.
+    The unknowns are y = 1 - (d - g) / eta at all nodes except the last node (where y = 1), and the width of the slip
+    zone. Under constant force, the depth is a further unknown. As long as the border moves, the last unknown is the
+    border. `load` is half of the force on the virgin slip zone, divided by eta. At constant depth, `load` is None. If
+    the border does not move, `border` is the value of q at the border, and `frozen` is the worn depth there. If the
+    border moves, `border` is None.
     """
 
     profile: Profile
@@ -137,7 +139,7 @@ class PartialSlip:
         return y
 
     def place(self, unknowns: FloatArray) -> Place:
-        """Return border, width and depth of the contact."""
+        """Return border and width of the slip zone, and the depth."""
         border = float(unknowns[-1]) if self.border is None else self.border
         return Place(border, float(unknowns[self.size - 1]), 0.0 if self.load is None else float(unknowns[self.size]))
 
@@ -169,7 +171,8 @@ class PartialSlip:
         return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.panels.nodes.size))
 
     def under_force(self, virgin: SlipMoment) -> tuple[PartialSlip, SlipMoment]:
-        """Return this problem with constant force instead of constant depth, and the first moment of that problem.
+        """Return this problem with constant force instead of constant depth, and the contact with which the new problem
+        starts.
 
         `virgin` is the virgin contact as a solution of the discrete equations.
         """
@@ -177,15 +180,16 @@ class PartialSlip:
         return forced, replace(virgin, unknowns=np.append(virgin.unknowns, [0.0, 0.0]))
 
     def stop(self, moment: SlipMoment) -> tuple[PartialSlip, SlipMoment]:
-        """Return the problem in which the border no longer moves, and the first moment of that problem."""
+        """Return the problem in which the border no longer moves, and the contact with which this problem starts."""
         border = moment.path[0, -1:]
         still = replace(self, border=float(border[0]), frozen=float(self.frozen_depth(moment.path, border)[0]))
         return still, replace(moment, unknowns=moment.unknowns[:-1])
 
     def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns for the contributions of the past moments to the residual.
+        """Return a function that computes from the unknowns how past contacts contribute to the residual.
 
-        The contributions are those to s and to the worn depth, and the increase of the load of the stick zone.
+        The function returns the contributions to s and to the worn depth, and the increase of the load of the stick
+        zone.
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
@@ -213,7 +217,7 @@ class PartialSlip:
         return np.where(place > 0.0, depth, 0.0)
 
     def worn_depth(self, moment: SlipMoment, q: FloatArray) -> FloatArray:
-        """Return the worn depth at values of q; 0 beyond the edge."""
+        """Return the worn depth at values of q. The worn depth beyond the edge is 0."""
         place = self.place(moment.unknowns)
         z = (q - place.border) / place.width
         inside = np.clip(z, 0.0, 1.0)
@@ -230,7 +234,7 @@ class PartialSlip:
         return np.asarray(self.panels.inner @ (self.image(unknowns) * self._factor(self.place(unknowns))))
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return p / eta at the nodes; zero at the edge, where nothing wears."""
+        """Return p / eta at the nodes. The value at the edge is set to zero, because nothing wears there."""
         result = self.panels.outer @ self.image(unknowns) / np.sqrt(self.body.width * self.place(unknowns).width)
         result[-1] = 0.0
         return np.asarray(result)
@@ -250,10 +254,10 @@ class PartialSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes; the value at the edge is zero if s is continuous there.
+        """Return s - known - theta (p / eta) s at the nodes. The value at the edge is zero if s is continuous there.
 
-        Under constant force, the next value is the deviation of the load. If the border moves, the last value is y at
-        the border.
+        Under constant force, the next value is the computed load minus `load`. If the border moves, the last value is y
+        at the border.
         """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
@@ -295,7 +299,7 @@ class PartialSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities with controlled error: s and, under constant force, the depth and a moving border."""
+        """Return the quantities with controlled errors: s and, under constant force, the depth and a moving border."""
         weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -303,7 +307,7 @@ class PartialSlip:
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[SlipMoment]
     ) -> SlipMoment:
-        """Return the moment at the end of a solved step."""
+        """Return the contact at the end of a solved time step."""
         size, place = self.size, self.place(unknowns)
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path = past[0].path
@@ -313,7 +317,7 @@ class PartialSlip:
         return SlipMoment(time, unknowns, worn, path, moved)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_b^a (d - g) y dx, the energy dissipated per cycle, divided by mu."""
+        """Return dV/dN = 2 int_b^a (d - g) y dx, which is the energy dissipated per cycle divided by mu."""
         y, place = self.image(unknowns), self.place(unknowns)
         root = np.sqrt(self.body.width * place.width)
         return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
@@ -338,7 +342,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return border and depth at those points of a path where the border is farther out than at all earlier points."""
+    """Return border and depth at the points of a path where the border is farther out than at all earlier points."""
     furthest = np.maximum.accumulate(path[0])
     new = np.append(True, np.diff(furthest) > 0.0)
     return furthest[new], path[1, new]
@@ -410,7 +414,7 @@ def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
 
 @jit_inline
 def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
-    """Return the rise of f_star at q on a straight piece of the path; the depth rises by `change` along the piece."""
+    """Return the rise of f_star at q on a straight piece of the path. Along the piece, the depth rises by `change`."""
     low, high = min(first, last), max(first, last)
     if low >= q:
         return 0.0
@@ -429,10 +433,10 @@ def _piece(body: VirginBody, first: float, last: float, change: float, q: float)
 
 @dataclass(frozen=True, eq=False)
 class GrossSlip:
-    """Slip in the whole contact; the nodes lie at r^2 = z a^2, where z are the nodes of `panels`, between 0 and 1.
+    """Slip in the whole contact. The nodes lie at r^2 = z a^2, where z are the nodes of `panels`, between 0 and 1.
 
-    The unknowns are the image g at all nodes except the last, where g = d, the squared contact radius a^2, and the
-    depth d if the force is given. The accumulated quantity is the worn depth int p ds.
+    The unknowns are the image g at all nodes except the last node (where g = d), the squared contact radius a^2 and, if
+    the force is given, the depth d. The accumulated quantity is the worn depth int p ds.
     """
 
     profile: Profile
@@ -458,7 +462,7 @@ class GrossSlip:
         return Moment(0.0, unknowns, np.zeros(self.panels.nodes.size))
 
     def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns: the weighted sum of the past worn depths at the nodes."""
+        """Return a function that computes, from the unknowns, the weighted sum of the past worn depths at the nodes."""
         last = self.panels.nodes.size - 1
 
         def known(unknowns: FloatArray) -> FloatArray:
@@ -473,11 +477,11 @@ class GrossSlip:
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
     ) -> Moment:
-        """Return the moment at the end of a solved step; `known` is the contribution of the past moments."""
+        """Return the contact at the end of a solved time step. `known` is the contribution of the past contacts."""
         return Moment(time, unknowns, self._accumulated(unknowns, theta, known))
 
     def image(self, unknowns: FloatArray) -> FloatArray:
-        """Return g at all nodes; the last value is the depth."""
+        """Return g at all nodes. The last value is the depth."""
         return np.append(unknowns[: self.panels.nodes.size - 1], 1.0 if self.force is None else unknowns[-1])
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
@@ -501,9 +505,10 @@ class GrossSlip:
         return accumulated
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p at the nodes and, if the force is given, the deviation of the force.
+        """Return f - f0 - known - theta p at the nodes and, if the force is given, the computed force minus the given
+        force.
 
-        The value at the last node, the edge, is zero if f is continuous there.
+        The last node is the edge. The value at the edge is zero if f is continuous there.
         """
         virgin = self.profile.height(self.edge(unknowns) * np.sqrt(self.panels.nodes))
         rows = self.worn(unknowns) - virgin - self._accumulated(unknowns, theta, known)

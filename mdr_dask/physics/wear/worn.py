@@ -1,7 +1,8 @@
-"""The worn contact that all rules and evolutions return, its errors, and the transforms of its image.
+"""The class `Worn` for a worn contact with its errors, and the integrals from the image to profile, pressure and
+volume.
 
-Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*). Heights f are
-measured upwards from the virgin apex, so wear increases f.
+Lengths are divided by a0, heights by d0, pressures by E* d0 / a0, volumes by a0^2 d0, and numbers of cycles by N0 = a0
+sigma0 / (4 U0 k E*). Heights f are measured upwards from the virgin apex. Wear increases f.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "press
 JUMP_WIDTH = (
     1e-9  # a change of the image within this distance from a border, divided by the radius of the border, is a jump
 )
-#: The error of a function is the largest difference within this number of neighbours, because the difference of two
-#: functions vanishes where they intersect.
+#: The error of a function is the largest difference within this number of neighbouring points, because the difference
+#: at a single point may be zero by chance.
 REACH = 5
 
 
@@ -36,7 +37,8 @@ class Worn:
     Parameters
     ----------
     contact_radius : float
-        Radius of the wear scar: beyond it f = f0. In an exact evolution, the contact radius a equals this radius.
+        Radius of the wear scar. Beyond the scar f = f0. In an exact evolution, the contact radius equals the radius of
+        the scar.
     stick_border : float
         Radius up to which the contact sticks; 0 in gross slip.
     depth, normal_force : float
@@ -47,15 +49,15 @@ class Worn:
         f(r), g(x) and p(r), for any position.
     energy_volume : float
         The dissipated energy divided by mu, in the unit of volume. According to the wear law, this volume equals the
-        wear volume. It is NaN if it is unknown.
+        wear volume. If the energy is unknown, the value is NaN.
     rougher : tuple of Worn
         One or two coarser solutions of the same contact. The errors are estimated from the differences between this
-        solution and the coarser ones.
+        solution and the coarser solutions.
     least_errors : mapping of str to float
-        Lower limits of the stated errors, indexed by the name of the output. A limit is given for an output in which
-        all solutions may agree by chance.
+        Lower limits of the stated errors, by name of the output. A limit is given for an output if all solutions may
+        agree by chance in this output.
     relative_error : float
-        Error of every output divided by the largest value of the output; used if there is no coarser solution.
+        Error of every output, divided by the largest value of the output. Only used if there is no coarser solution.
     """
 
     contact_radius: float
@@ -73,16 +75,17 @@ class Worn:
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return an output by name; outputs that are functions are evaluated at the positions `places`."""
+        """Return an output by name. If the output is a function, return the values at the positions `places`."""
         if output in FUNCTIONS:
             return np.asarray(getattr(self, FUNCTIONS[output])(places))
         return float(getattr(self, output))
 
     def error(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return the expected absolute error of an output; for functions, at the positions `places`.
+        """Return the expected absolute error of an output. If the output is a function, return errors at the positions
+        `places`.
 
-        The error follows from the differences between this solution and the coarser ones. Without coarser solutions,
-        the error is `relative_error` times the largest value.
+        The error follows from the differences between this solution and the coarser solutions. Without coarser
+        solutions, the error is `relative_error` times the largest value of the output.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
@@ -97,7 +100,7 @@ class Worn:
         return np.asarray(SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide)))
 
     def _distance(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the difference from the first coarser solution, or half the difference from the second if larger."""
+        """Return the difference from the first coarser solution, but at least half the difference from the second."""
         # two solutions may agree by chance
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
@@ -105,7 +108,7 @@ class Worn:
         return np.asarray(np.max(gaps, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
-        """Return positions from 0 to at least `last`, which are dense near the stick border and the contact edge."""
+        """Return positions from 0 to at least `last`, with small spacings near stick border and contact edge."""
         farthest = max(last, *(one.contact_radius for one in self.rougher))
         cuts = sorted({0.0, self.stick_border, self.contact_radius, farthest})
         steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
@@ -113,9 +116,10 @@ class Worn:
 
 
 class Scar(NamedTuple):
-    """The change g - g0 of the image between the first stick border c = `border` and the `radius` of the scar.
+    """The change g - g0 of the image from the virgin stick radius c = `border` to the `radius` of the scar.
 
-    `change` and its derivative `slope` are functions of position; at `breaks` the change is not smooth.
+    `change` and its derivative `slope` are functions of position. At the positions in `breaks`, the change is not
+    smooth.
     """
 
     border: float
@@ -151,7 +155,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def worn_image(profile: Profile, scar: Scar) -> Function:
-    """Return the worn image g(x); beyond the scar, the image is continued so that f = f0."""
+    """Return the worn image g(x). Beyond the scar, the image is continued such that f = f0."""
 
     def image(position: FloatArray) -> FloatArray:
         x = np.abs(position)
@@ -182,7 +186,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        # the image jumps at the border: points this close to the border are left out
+        # the image jumps at the border; points very close to the border are left out
         changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
@@ -221,7 +225,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 def worn_by(
     profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float, wear_volume: float
 ) -> Worn:
-    """Return the worn contact for a scar, if the contact sticks up to `border` and carries load up to `edge`."""
+    """Return the worn contact for a scar. The contact sticks up to `border`, and carries load up to `edge`."""
     slipping = scar.border + (scar.radius - scar.border) * np.linspace(0.0, 1.0, 201)[1:-1]
     return Worn(
         contact_radius=scar.radius,
@@ -237,7 +241,7 @@ def worn_by(
 
 
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
-    """Return g - g0 outside a scar of radius a, where f = f0, so that the half-integral of the change vanishes.
+    """Return g - g0 outside a scar of radius a, where f = f0 and the half-integral of the change vanishes.
 
     The change is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The substitutions are
     t = a cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
@@ -268,7 +272,7 @@ def check_stick_radius(stick_radius: float) -> None:
 
 
 def beyond_table(profile: Profile, stick_radius: float) -> ValueError:
-    """Return the error for a contact that reaches beyond the table of its profile."""
+    """Return the exception for a contact that reaches beyond the table of the profile."""
     return ValueError(
         f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
         f"extend the table or choose a larger stick radius (a smaller amplitude) than {stick_radius:.4g}"
@@ -276,7 +280,7 @@ def beyond_table(profile: Profile, stick_radius: float) -> ValueError:
 
 
 def virgin_load(profile: Profile, radius: float) -> float:
-    """Return int_0^c (1 - g0) dx for c = `radius`; x = c t^4 makes a power law smooth at the axis."""
+    """Return int_0^c (1 - g0) dx for c = `radius`. The substitution x = c t^4 makes a power law smooth at the axis."""
     abscissa, weight = gauss(64)
     return 4.0 * radius * float(((1.0 - profile.image(radius * abscissa**4)) * abscissa**3) @ weight)
 

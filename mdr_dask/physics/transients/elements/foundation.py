@@ -1,4 +1,4 @@
-"""One element of a viscoelastic foundation during one step: moved at constant speed, or recovering without force.
+"""Motion of one element of a viscoelastic foundation: at constant speed in contact, or in free recovery.
 
 In all functions, `terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and
 i is the index of one element. Functions take the index, because slicing an array would take longer. The static modulus
@@ -18,13 +18,14 @@ from mdr_dask.physics.solids import recovery_times
 
 
 class Foundation(NamedTuple):
-    """A solid with the static modulus 1, and the modes in which its elements recover without force.
+    """A solid with the static modulus 1, and the modes in which elements of this solid recover without force.
 
-    `moduli` and `times` are G_m / G_inf and tau_m; `viscosity` is eta / G_inf, or 0 without a dashpot. `rates` are the
-    decay rates of the modes: one for each Prony term, and one more if there is a dashpot. The matrix `outward`
-    transforms the modes to the state of an element, and `inward` transforms back. The state consists of the strains a_m
-    of the dashpots of the Prony terms; if the solid itself has a dashpot, the displacement u is the first entry. `push`
-    contains, for each mode, the rate at which a load of 1 increases the mean of this mode over all elements.
+    `moduli` and `times` are G_m / G_inf and tau_m of the Prony terms. `viscosity` is eta / G_inf, or 0 without a
+    dashpot. `rates` are the decay rates of the modes. There is one mode for each Prony term, and one more mode if the
+    solid itself has a dashpot. The matrix `outward` transforms the modes to the state of an element, and the matrix
+    `inward` transforms the state to the modes. The state consists of the strains a_m of the dashpots of the Prony
+    terms. If the solid itself has a dashpot, the displacement u is the first entry of the state. `push` contains, for
+    each mode, the rate at which a load of 1 increases the mean of this mode over all elements.
     """
 
     moduli: FloatArray
@@ -37,7 +38,7 @@ class Foundation(NamedTuple):
 
 
 def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
-    """Return the foundation: `moduli` are G_m / G_inf, `times` the distinct tau_m, and `viscosity` is eta / G_inf.
+    """Return a foundation. `moduli` are G_m / G_inf, `times` are the distinct tau_m, and `viscosity` is eta / G_inf.
 
     For a Kelvin solid (no Prony terms), the viscosity is 1 if the unit of time is tau.
     """
@@ -57,9 +58,9 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
 
 
 class Lapse(NamedTuple):
-    """A duration, the factors of decay during this time, and work arrays for one element.
+    """A duration, the factors of decay during this duration, and work arrays for one element.
 
-    `decay` and `fades` are the factors by which the modes and the strains of the Prony terms decay; `part_decay` and
+    `decay` and `fades` are the factors by which the modes and the strains of the Prony terms decay. `part_decay` and
     `part_fades` are the factors for a part of the duration.
     """
 
@@ -94,7 +95,7 @@ def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray)
 
 @jit
 def recover(solid: Foundation, u: float, terms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
-    """Return the displacement of an element after free recovery; its `terms` are overwritten."""
+    """Return the displacement of an element after free recovery, and overwrite its strains in `terms`."""
     if solid.times.size == 0:
         return float(u * decay[0])
     extra = 1 if solid.viscosity > 0 else 0
@@ -119,7 +120,7 @@ def recover(solid: Foundation, u: float, terms: FloatArray, i: int, decay: Float
 
 @jit
 def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
-    """Return the force-free displacement of an element without a dashpot."""
+    """Return the displacement at which the force on an element of a solid without a dashpot is zero."""
     pull, glass = 0.0, 1.0
     for m in range(solid.times.size):
         pull += solid.moduli[m] * terms[i, m]
@@ -129,11 +130,11 @@ def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
 
 @jit
 def press(solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray) -> None:
-    """Move an element from u0 to u1 at constant speed; its `terms` are overwritten."""
+    """Move an element from u0 to u1 at constant speed, and overwrite the strains of this element in `terms`."""
     if step <= 0:
         return
     for m in range(solid.times.size):
-        # stretch of the spring of the term after a long time
+        # elongation of the spring of the Prony term after a long time
         steady = (u1 - u0) / step * solid.times[m]
         terms[i, m] = u1 - (steady + ((u0 - terms[i, m]) - steady) * fades[m])
 
@@ -151,10 +152,11 @@ def pull(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
 def release(
     solid: Foundation, lapse: Lapse, w0: float, w1: float, rise0: float, rise1: float, terms: FloatArray, i: int
 ) -> tuple[float, float]:
-    """Return the fraction of a duration after which an element in contact separates, and its displacement at that time.
+    """Return the fraction of a duration after which an element in contact separates, and the displacement then.
 
-    The displacement changes from w0 to w1; its rates at the start and at the end are `rise0` and `rise1`. The force is
-    taken as linear in time, and the displacement as cubic. The fraction is 1 if the element does not separate.
+    The displacement changes from w0 to w1. The rates of the displacement are `rise0` at the start and `rise1` at the
+    end. The force is taken as a linear function of time, and the displacement as a cubic function of time. If the
+    element does not separate, the fraction is 1.
     """
     begin = pull(solid, w0, terms, i) + solid.viscosity * rise0
     if begin <= 0:
@@ -177,8 +179,8 @@ def free_after(
 ) -> float:
     """Return the displacement of an element at the end of a duration.
 
-    The element is moved to the displacement `leaves` during the fraction `part` of the duration, and is then free.
-    The strains at the end are written to `lapse.strains`; `terms` is not changed.
+    The element is first moved to the displacement `leaves`, during the fraction `part` of the duration, and is then
+    free. The strains at the end are written to `lapse.strains`. `terms` is not changed.
     """
     strains, decay, fades = lapse.strains, lapse.part_decay, lapse.part_fades
     for m in range(solid.times.size):
@@ -205,11 +207,11 @@ def advance(
     terms: FloatArray,
     i: int,
 ) -> tuple[float, bool]:
-    """Move one element through a duration, with its strains `terms`; return displacement and contact at the end.
+    """Move one element through a duration, and return its displacement and whether it is in contact at the end.
 
-    The depth plus height of the line changes from w0 to w1; u0 and `touching` are displacement and contact at the
-    start. `part` and `leaves` are results of :func:`release` for an element in contact. `after` is the displacement at
-    the end for an element that separates or stays free.
+    The depth plus height of the line changes from w0 to w1. u0 is the displacement of the element at the start, and
+    `touching` is True if the element is in contact at the start. `part` and `leaves` are results of :func:`release` for
+    an element in contact. If the element separates or stays free, `after` is its displacement at the end.
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades

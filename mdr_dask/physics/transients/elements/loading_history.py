@@ -1,4 +1,4 @@
-"""Friction under any loading history, from the motion of every element; second-order accurate in the time step.
+"""Friction under any loading history, from the motion of every element, with an error of second order in the time step.
 
 Times are in the unit of time of the solid. Travel is divided by the length of the line. Loads are F_N / (4 G_inf L) in
 the unit of height.
@@ -57,9 +57,9 @@ def untouched(elements: int, terms: int) -> State:
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the state of the elements at the nodes in steady sliding, the depth, and the outcome.
 
-    One element is moved along the line in steps of half a cell, by the method of :func:`follow_line`, until its state
-    repeats. The depth is found from the mean displacement, which increases with the depth. At ``deborah = 0`` the
-    elements are in equilibrium at rest under the load.
+    One element is moved along the line in steps of half a cell, by the method of :func:`follow_line`, until the state
+    of the element repeats. The load that belongs to a depth is computed from the mean displacement. The depth is the
+    root for the given load. At ``deborah = 0`` the elements are in equilibrium at rest under the load.
     """
     n, terms = line.height.size - 1, solid.times.size
     state = untouched(n, terms)
@@ -95,7 +95,7 @@ def _halved(line: CubicLine) -> CubicLine:
 
 
 def _resting(line: CubicLine, state: State, depth: float) -> float:
-    """Write the state of all elements in equilibrium under a body at rest; return the load."""
+    """Write the state of all elements in equilibrium under a body at rest. Return the load."""
     w = depth + line.height[:-1]
     state.displacement[:] = np.maximum(w, 0)
     state.terms[:] = state.displacement[:, None]
@@ -106,7 +106,7 @@ def _resting(line: CubicLine, state: State, depth: float) -> float:
 
 
 def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, depth: float) -> float:
-    """Write the steady state of all elements at a depth; return the load that causes their mean displacement."""
+    """Write the steady state of all elements at a depth. Return the load that causes the mean displacement."""
     if depth + line.height[:-1].max() <= 0:
         return 0.0
     n = state.displacement.size
@@ -121,9 +121,10 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
 
 @jit
 def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State) -> tuple[bool, float]:
-    """Move one element along the line at constant depth until its state repeats, and write the state of all elements.
+    """Move one element along the line at constant depth until the state repeats, and write the state of all elements.
 
-    Return whether the state repeats, and the displacement of the element at the end of the line.
+    Return whether the state repeats (always True if the line is not periodic), and the displacement of the element at
+    the end of the line.
     """
     n = line.height.size - 1
     # every k-th node belongs to an element, with k = `every`
@@ -167,11 +168,11 @@ def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, sta
 def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: State, depth: float) -> Response:
     """Compute the motion of every element of a linear foundation under a line.
 
-    During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
-    The mean displacement depends on the load, but not on which elements are in contact, so that the depth is the root
-    of a convex function. If the line is not periodic, elements enter undeformed. Forces are interpolated linearly
-    between elements, which is most accurate for a line without kinks. `state` and `depth` describe the first instant
-    and are not overwritten.
+    During a time step, an element in contact moves at constant speed, and a free element recovers by the modes of the
+    solid. The mean displacement depends on the load, but not on which elements are in contact. Therefore the depth is
+    the root of a convex function. If the line is not periodic, elements enter undeformed. Forces between elements are
+    interpolated by cubics in cells with full contact, and linearly in all other cells. The interpolation is most
+    accurate if the line has no kinks. `state` and `depth` describe the first instant and are not overwritten.
     """
     now, out = deepcopy(state), np.full((3, schedule.instants.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
@@ -179,11 +180,11 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
     return Response(drag, depths, contact, Outcome(status), now)
 
 
-MOST_STEPS = 400_000  # largest number of steps in one piece of a history
+MOST_STEPS = 400_000  # largest number of time steps in one piece of a history
 # CELLS, PART and FIRST are divided by the number of steps per decade
-CELLS = 6.0  # largest number of cells that the line travels in a step
-PART = 0.12  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
-FIRST = 0.012  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
+CELLS = 6.0  # largest number of cells that the line travels in a time step
+PART = 0.12  # largest time step, as a fraction of the duration of a ramp or of the period of an oscillation
+FIRST = 0.012  # first time step, as a fraction of the longest time step or of the unit of time, whichever is smaller
 NEARLY = 1e-2  # a time step is left out if its end differs from a requested time by less than this fraction of the step
 
 
@@ -231,7 +232,7 @@ class Piece:
         return np.inf if same else self.end - self.start
 
     def longest_step(self, nodes: int, per_decade: float) -> float:
-        """Return the longest time step, which is limited by the travel of the line and by the changes of its motion."""
+        """Return the longest time step that resolves the travel of the line and the changes of velocity and load."""
         fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
         most = CELLS / (nodes * fastest) if fastest else np.inf
         return min(most, PART * self.changes_in) / per_decade
@@ -239,7 +240,7 @@ class Piece:
     def instants(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
         """Return the times of all steps from the start of the piece to `end`, or None if there would be too many steps.
 
-        The steps begin small and grow in a constant ratio up to the longest step.
+        The first time step is short, and the time steps grow in a constant ratio up to the longest time step.
         """
         span = end - self.start
         if span <= 0:
@@ -262,8 +263,8 @@ class Trace(NamedTuple):
     """Friction during a history.
 
     The friction is the drag F_x / (4 G L) divided by the load F_N / (4 G_inf L), in the unit of height divided by the
-    unit of length. `before` is the friction in the steady state before t = 0, `at` the friction just after t = 0, and
-    `after` the friction in the final steady state. `after` is NaN if the history does not end in steady forward
+    unit of length. `before` is the friction in the steady state before t = 0. `at` is the friction just after t = 0.
+    `after` is the friction in the final steady state. `after` is NaN if the history does not end in steady forward
     sliding. At a jump, `friction` and `depth` are the values just after the jump. `contact` is the largest fraction of
     the line in contact from t = 0 to the last requested time.
     """
@@ -288,9 +289,9 @@ def trace(
     """Compute the friction of a body during a history, from the motion of every element.
 
     Until t = 0 the body slides steadily with the velocity and the load in `before`, or is at rest if the velocity is 0.
-    Velocity and load may jump at t = 0. The pieces are in the order of time, and the end of the last one is
-    infinite. The requested times increase. `per_decade` is the number of steps per factor of ten in the time since the
-    start of a piece.
+    Velocity and load may jump at t = 0. The pieces are in the order of time, and the `end` of the last piece is
+    infinite. The requested times increase. `per_decade` is the number of time steps per factor of ten in the time since
+    the start of a piece.
     """
     times = _snapped(times, np.array([piece.start for piece in pieces]))
     velocity, load_before = before
@@ -314,7 +315,7 @@ def trace(
         state, depth, travel = part.state, float(part.depth[-1]), float(travel + way[-1])
     instant, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
     at, after = float(friction[0]), _end(line, solid, pieces[-1])
-    last = np.searchsorted(instant, times, side="right") - 1  # for the time of a jump, the instant just after it
+    last = np.searchsorted(instant, times, side="right") - 1  # for the time of a jump, the instant just after the jump
     return Trace(first, at, after, friction[last], depths[last], float(contact.max()), Outcome.CONVERGED)
 
 
@@ -331,7 +332,9 @@ def _steady_friction(
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
-    """Return the friction in the final steady state, or NaN after an oscillation, at rest or in backward sliding."""
+    """Return the friction in the final steady state, or NaN if an oscillation, rest or backward sliding ends the
+    history.
+    """
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:
         return np.nan
@@ -342,7 +345,7 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
 
 
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
-    """Return the times, each replaced by the start of a piece if the two differ only by a rounding error."""
+    """Return the times. A time equal to the start of a piece except for a rounding error is replaced by this start."""
     nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
     found: FloatArray = np.where(np.isclose(times, nearest, rtol=1e-12, atol=0), nearest, times)
     return found

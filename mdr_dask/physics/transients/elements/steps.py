@@ -27,10 +27,11 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """The last known edges of contact at which the force is zero, at most one in the cell before each element.
+    """The last known edges of contact at which the force is zero, with at most one edge in the cell before each
+    element.
 
-    `place` is the distance between the edge and the element in contact, in cells, or -1 if there is no edge. `gap` is
-    the gap at the element out of contact, at the instant at which the edge was found.
+    The element at one end of the cell is in contact. `place` is the distance between this element and the edge, in
+    cells, or -1 if there is no edge. `gap` is the gap at the other end at the instant at which the edge was found.
     """
 
     place: FloatArray
@@ -40,7 +41,7 @@ class Edges(NamedTuple):
 class Drive(NamedTuple):
     """Deborah number and load at one instant.
 
-    `first` is the first element of a line that is not periodic, or -1 on a periodic line.
+    `first` is the first element of a line that is not periodic, or -1 if the line is periodic.
     """
 
     deborah: float
@@ -74,8 +75,8 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
     """Return the depth d at which the mean displacement is `mean`, and whether this depth was found.
 
-    The displacement of an element is max(d + h, free), with the height h of the line (`under`), and the displacement
-    `free` of the element without contact. The mean displacement is a convex, increasing function of d.
+    The displacement of an element is max(d + h, free). Here `under` contains the height h of the line, and `free` the
+    displacement of the element without contact. The mean displacement is a convex, increasing function of d.
     """
     n = under.size
     for _ in range(200):
@@ -104,7 +105,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, j: int) -> float:
-    """Return the mean over the cell before node j of the cubic through the four nearest `values`."""
+    """Return the mean, over the cell before node j, of a cubic through the four nearest `values`."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
@@ -113,7 +114,7 @@ def _whole(values: FloatArray, j: int) -> float:
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     """Return the distance between the edge of contact and the element in contact, in cells.
 
-    `inner` and `outer` are the gaps of the elements in contact and out of contact; `place` and `gap` are those of
+    `inner` and `outer` are the gaps of the elements in contact and out of contact. `place` and `gap` are entries of
     `Edges`.
     """
     if place < 0:
@@ -128,7 +129,7 @@ def _cell(
 ) -> tuple[float, float]:
     """Return where contact starts and ends in the cell before element j, as positions from 0 to 1.
 
-    If `keep` is True, write the edge of contact.
+    If `keep` is True, write the edge of contact to `edges`.
     """
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
@@ -154,7 +155,7 @@ def _cell(
 
 @jit
 def _forces(state: State, workspace: StepWorkspace, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return mean load, mean drag and the fraction of the line in contact; write the edges if `keep` is True."""
+    """Return mean load, mean drag and the fraction of the line in contact. If `keep` is True, store the edges."""
     force, power, slope, gaps = workspace.force, workspace.power, workspace.slope, workspace.gaps
     n, touching, edges = force.size, state.touching, state.edges
     load, drag, length = 0.0, 0.0, 0.0
@@ -191,11 +192,12 @@ def _pressing_rate(state: State, workspace: StepWorkspace, weight: float, debora
 def _carrying_rate(
     state: State, workspace: StepWorkspace, weight: float, rate: float, drive: Drive
 ) -> tuple[float, float, float]:
-    """Return the `rate` at which the elements carry the load, the drag, and the fraction of the line in contact.
+    """Return (1) the `rate` at which the elements carry the load, (2) the drag and (3) the fraction of the line in
+    contact.
 
     The force of an element pressed to the line is `pulls` plus `weight` times ``rate + deborah * slope``. With a
-    dashpot, `weight` is the viscosity and `rate` the rate of the depth. Without a dashpot, `weight` is the glass
-    modulus, `rate` a correction of the depth, and `deborah` 0. The edges of contact are written to `state`.
+    dashpot, `weight` is the viscosity and `rate` is the rate of the depth. Without a dashpot, `weight` is the glass
+    modulus, `rate` is a correction of the depth, and `deborah` is 0. The edges of contact are written to `state`.
     """
     force, power, slope, pulls = workspace.force, workspace.power, workspace.slope, workspace.pulls
     drag, length = 0.0, 0.0
@@ -215,14 +217,14 @@ def _carrying_rate(
 
 
 DRAG, DEPTH, CONTACT = range(3)
-CORRECTIONS = 2  # number of corrections of the times of separation and of the depth in a step
+CORRECTIONS = 2  # number of times that the times of separation and the depth are corrected in a time step
 
 
 class State(NamedTuple):
-    """State of all elements at one instant: displacement u, strains of the dashpots of the Prony terms, and contact.
+    """State of all elements at one instant: displacement u, strains of the dashpots of the Prony terms, contact or not.
 
     `free` and `free_terms` are the displacement and the strains that an element in contact would have if it had stayed
-    free. For a free element, `free` is its displacement, and `free_terms` is not used.
+    free. For a free element, `free` is the displacement, and `free_terms` is not used.
     """
 
     displacement: FloatArray
@@ -235,7 +237,7 @@ class State(NamedTuple):
 
 @jit
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
-    """Return the mean displacement after a step; it depends on the load, but not on which elements are in contact."""
+    """Return the mean displacement after a time step. The set of elements in contact does not affect this mean."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
     count, terms = solid.rates.size, solid.times.size
     inward, strain, mean = solid.inward, state.terms, state.displacement.sum() / n
@@ -268,7 +270,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _load_instantly(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, bool]:
-    """Apply a load at once to elements without a dashpot; return the depth, and whether the depth was found."""
+    """Apply a load at once to elements without a dashpot. Return the depth, and whether the depth was found."""
     n, mean = under.size, 0.0
     for j in range(n):
         state.free[j] = at_rest(solid, state.terms, j)
@@ -296,7 +298,7 @@ class Schedule(NamedTuple):
     """Travel, velocity and load at the instants of a loading history, shape (instants,) each.
 
     Velocity and load may jump at the first time. Travel and velocity are divided by L, and may be negative. Loads are
-    F_N / (4 G_inf L), positive, and linear between the instants.
+    F_N / (4 G_inf L). Loads are positive, and vary linearly between the instants.
     """
 
     instants: FloatArray
@@ -306,13 +308,14 @@ class Schedule(NamedTuple):
 
 
 class StepWorkspace(NamedTuple):
-    """Work arrays of one step, shape (n,) each, except `after_terms` with the shape (n, terms).
+    """Work arrays of one time step, shape (n,) each, except `after_terms` with the shape (n, terms).
 
-    Heights (`under`) and slopes of the line belong to the end of the step, or, with the prefix `old_`, to its start.
-    `after` is the displacement without contact at the end of the step. `parts` and `leaves` are results of
-    :func:`release`. `gaps` is depth + h minus the displacement that an element would have without contact; without a
-    dashpot, `gaps` is a copy of `pulls`. `pulls` is the force of spring and Prony terms of an element that follows the
-    line, `force` its total force, and `power` the product of this force and the slope.
+    `under` and `slope` are height and slope of the line at the end of the time step. `old_under` and `old_slope` are
+    height and slope at the start. `after` is the displacement without contact at the end of the time step. `parts` and
+    `leaves` are results of :func:`release`. `gaps` is depth + h minus the displacement that an element would have
+    without contact. For a solid without a dashpot, `gaps` is a copy of `pulls`. `pulls` is the force of spring and
+    Prony terms of an element that follows the line. `force` is the total force of this element, and `power` is the
+    product of total force and slope.
     """
 
     under: FloatArray
@@ -345,7 +348,7 @@ def _separate(
     depth: float,
     deborah: tuple[float, float],
 ) -> None:
-    """Write the times at which elements separate during a step, and the displacements at the end of the step."""
+    """Write the times at which elements separate in a step, and the displacements of these elements after the step."""
     parts, leaves, fall = workspace.parts, workspace.leaves, (depth - old_depth) / lapse.time
     for j in range(workspace.under.size):
         if state.touching[j]:
@@ -394,9 +397,10 @@ def _step(
     guess: float,
     deborah: tuple[float, float],
 ) -> tuple[float, bool]:
-    """Move all elements through a step; return the depth at its end, and whether this depth was found.
+    """Move all elements through a time step. Return the depth at the end, and whether this depth was found.
 
-    `mean` is the mean displacement at the end of the step. `deborah` contains v tau / L at the start and at the end.
+    `mean` is the mean displacement at the end of the time step. `deborah` contains v tau / L at the start and at the
+    end.
     """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
@@ -419,8 +423,8 @@ def forces_now(
 ) -> tuple[float, float, float, float]:
     """Return the depth, the rate of the depth, the drag and the fraction of the line in contact.
 
-    The edges of contact are written to `state`. Until the elements carry the load, the rate of the depth is changed if
-    there is a dashpot, and otherwise the depth itself.
+    The edges of contact are written to `state`. If the solid has a dashpot, the rate of the depth is corrected until
+    the elements carry the load. If the solid has no dashpot, the depth is corrected instead.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
@@ -439,7 +443,7 @@ def forces_now(
 def follow_elements(
     solid: Foundation, line: CubicLine, schedule: Schedule, state: State, depth: float, out: FloatArray
 ) -> int:
-    """March all elements through the time steps; return an `Outcome`.
+    """March all elements through the time steps. Return an `Outcome`.
 
     `out`, shape (3, instants), receives the drag, the depth, and the fraction of the line in contact.
     """
