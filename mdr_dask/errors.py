@@ -1,4 +1,4 @@
-"""The exceptions of mdr_dask, and parts of their messages. Workers pickle exceptions: use positional arguments only."""
+"""The exceptions of mdr_dask, and hints for messages. Workers pickle exceptions: use positional arguments only."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class MdrDaskError(Exception):
 
 
 class CampaignError(MdrDaskError):
-    """A campaign that cannot be run; the arguments of the exception are the messages about all problems."""
+    """A campaign that cannot be run. The arguments of the exception are the messages about all problems."""
 
     def __str__(self) -> str:
         return "\n".join(str(problem) for problem in self.args)
@@ -55,7 +55,7 @@ def distinguishable(
     digits: int = 3,
     write: Callable[[float, int], str] = lambda number, digits: f"{number:.{digits}g}",
 ) -> tuple[str, ...]:
-    """Return a number and its limits as texts of `digits` digits, or more if the number would look equal to a limit."""
+    """Return a number and its limits as texts, with more than `digits` digits if the number would look like a limit."""
     for more in range(digits, _ALL_DIGITS):
         first, *others = (write(number, more) for number in (value, *limits))
         if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):
@@ -89,17 +89,17 @@ _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the nearest known word, or else with all known words if there are few."""
+    """Return a hint with the most similar known word. If no word is similar, name all known words if there are few."""
     return similar(word, known) or (f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else "")
 
 
 def similar(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the nearest known word, such as `` (did you mean 'hurst'?)``, or an empty text."""
+    """Return a hint with the most similar known word, such as `` (did you mean 'hurst'?)``, or an empty text."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}
     typed = str(word).casefold()
-    quantity = typed.rpartition("_")[2]  # the last word of a compound name: diameter in roller_diameter
+    quantity = typed.rpartition("_")[2]  # diameter in roller_diameter
     synonyms = [name for name in _SYNONYMS.get(quantity, ()) if name in folded]
     alike = get_close_matches(typed, list(folded), n=1)
     if synonyms and quantity in _DIFFERENCES:

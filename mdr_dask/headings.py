@@ -59,10 +59,9 @@ _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
 
 @dataclass(frozen=True)
 class Column:
-    """The description of a column that a table may have. The table may also use one of the `SYNONYMS` of its name, or
-    one of `other_names`.
+    """A column that a table may contain under the given name, a synonym in `SYNONYMS`, or one of `other_names`.
 
-    The SI `unit` is ``"1"`` for pure numbers. Values must be greater than `above` and not smaller than `least`, in SI.
+    The SI `unit` is ``"1"`` for pure numbers. In SI, all values must be greater than `above` and at least `least`.
     `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of this
     column, unless the column contains pure numbers.
     """
@@ -76,38 +75,37 @@ class Column:
     given_unit: str = ""
 
     def holds(self, heading: str) -> bool:
-        """Return whether a heading without unit is a name of this column."""
+        """Return whether a heading, without its unit, is a name of this column."""
         return is_called(heading, self.name, *self.other_names)
 
 
 def plain(name: str) -> str:
     """Return a name in lower case, with blanks instead of punctuation.
 
-    A single letter keeps its case: t is a time, T a temperature.
+    A single letter keeps its case, because t is a time and T is a temperature.
     """
     name = re.sub(r"[\s_.\-:()|]+", " ", name.translate(_ALIKE)).strip()
     return name if len(name) == 1 else name.casefold()
 
 
 def _key(name: str) -> str:
-    """Return a name without blanks and without the words that do not change its meaning."""
+    """Return a name without blanks and without the words in `IGNORED`."""
     words = plain(name).split()
     return "".join([word for word in words if word not in IGNORED] or words)
 
 
 @lru_cache(maxsize=1024)
 def _names_of(name: str) -> list[str]:
-    """Return a name and all its synonyms. A mean velocity has synonyms of its own, a mean force those of a force."""
+    """Return a name and all its synonyms. If `SYNONYMS` lacks the name, words in `IGNORED` are left out of the name."""
     lines = [line for line in SYNONYMS if plain(name) in map(plain, line)]
     lines = lines or [line for line in SYNONYMS if _key(name) in map(_key, line)]
     return [name, *(each for line in lines for each in line)]
 
 
 def is_called(heading: str, name: str, *others: str) -> bool:
-    """Return whether a heading is a name, a synonym of this name, or another name, perhaps abbreviated or followed by a
-    symbol.
+    """Return whether a heading is `name`, a synonym of `name`, or one of the `others`.
 
-    For example, ``Storage modulus G'`` and ``Stor. mod.`` are names of the storage modulus.
+    The heading may be abbreviated, as in ``Stor. mod.``, or followed by a symbol, as in ``Storage modulus G'``.
     """
     known = [*others, *_names_of(name)]
     if _key(heading) in map(_key, known):
@@ -120,7 +118,7 @@ def is_called(heading: str, name: str, *others: str) -> bool:
 
 
 def nearest(heading: str, names: Sequence[str]) -> str:
-    """Return a hint with a name that is similar to a heading, or else with a name that has a word in common with it.
+    """Return a hint with a name that is similar to a heading, or else with a name that contains a word of the heading.
 
     The hint is empty if there is no such name.
     """
@@ -130,10 +128,10 @@ def nearest(heading: str, names: Sequence[str]) -> str:
 
 
 def split_unit(heading: str) -> tuple[str, str]:
-    """Return the name and the unit of a heading: ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
+    """Return the name and the unit of a heading such as ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    Text in square brackets is always a unit. Any other text is a unit only if it looks like one and is not a symbol of
-    the quantity: F in ``force (F)`` is the symbol of the force.
+    Text in square brackets is always a unit. Any other text must look like a unit. In ``force (F)``, F is the symbol of
+    the force and not a unit.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -145,11 +143,12 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column that a name means, and the unit, which may be part of the name: mm/s in ``v_mm_s``.
+    """Return the column that a name means, and its unit. The unit may be part of the name, such as mm/s in ``v_mm_s``.
 
-    The column is None if the name means none of the `columns`. The exact name of a column comes first, then a synonym,
-    then another name; among columns of equal rank, the unit decides. If it does not decide, ValueError is raised. A
-    synonym of another name is used if no other column fits.
+    The column is None if the name means none of the `columns`. The name is compared with the names of `columns`, then
+    with their synonyms, and then with their `other_names`. Columns that the unit does not fit are considered last.
+    ValueError is raised if several columns fit equally well. If no column fits, the name may also be a synonym of an
+    entry of `other_names`.
     """
     exact = [column for column in columns if plain(name) == plain(column.name)]
     synonyms = [column for column in columns if is_called(name, column.name)]
@@ -162,7 +161,7 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             return alike[0], unit
     if found := exact or synonyms or ([] if unit else others):  # the unit is wrong or missing
         return found[0], unit
-    # further words, as in "sliding speed", may mean another quantity, and so may a short name such as "force"
+    # a single word, and a unit that fits only one column: otherwise the name may mean another quantity
     quantities = {line[0] for line in SYNONYMS} if " " not in plain(name) else set()
     short = [each for each in columns if any(is_called(name, other) for other in quantities & set(each.other_names))]
     if len(agreeing := [column for column in short if _agrees(unit, column)]) == 1:
@@ -183,7 +182,7 @@ def _agrees(unit: str, column: Column) -> bool:
 
 
 def fits(unit: str, column: Column) -> bool:
-    """Return whether a unit is given and has the dimension of a column."""
+    """Return whether a unit has the dimension of a column. An empty unit has none."""
     try:
         factors(unit, column.unit)
     except ValueError:
@@ -194,7 +193,8 @@ def fits(unit: str, column: Column) -> bool:
 def factors(unit: str, wanted: str) -> tuple[float, float, float]:
     """Return the numbers p, q and z that convert a unit to SI: x in this unit is p (q x + z) in the SI unit `wanted`.
 
-    If an angular frequency is wanted, p is 2 pi for Hz and 1/min (revolutions per minute); 1/s counts as rad/s.
+    For an angular frequency, p is 2 pi if the unit is Hz or 1/min (revolutions per minute). Values in 1/s count as
+    values in rad/s. For all other quantities, p is 1.
     """
     if not unit:
         return 1.0, 1.0, 0.0

@@ -27,9 +27,9 @@ from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
 COMMENT = "#%"
 BLANKS = r"\s+"
 SEPARATORS = ("\t", ";", "|", ",", BLANKS)
-#: Start of the line that precedes each sheet of a workbook; the name of the sheet follows.
+#: In the text of a workbook, each sheet begins with a line of this text and the name of the sheet.
 SHEET = "# sheet of a workbook: "
-#: Two columns of one quantity agree if their relative difference is at most this. Instruments print three digits.
+#: Measured values count as equal up to this relative difference. Instruments print three digits.
 AGREE = 0.01
 NO_ROWS = "expected a line of names and at least one line of values"
 
@@ -37,7 +37,7 @@ NO_ROWS = "expected a line of names and at least one line of values"
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
 #: Characters that may separate thousands, in addition to the point or comma that is not the decimal mark.
 _GROUPS = "'\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"
-#: Patterns of a number, indexed by its decimal mark; the other mark may separate thousands.
+#: For each decimal mark, the pattern of a number with this mark. The other mark may separate thousands.
 _DECIMALS = {
     mark: rf"[+-]?(?:(?:\d+|[1-9]\d{{0,2}}(?:[{other}{_GROUPS}]\d{{3}})+)(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eE][+-]?\d+)?"
     for mark, other in (".,", ",.")
@@ -54,7 +54,10 @@ Cells = NDArray[np.object_]
 
 
 class Problem(NamedTuple):
-    """A problem: line and column of a cell, counted from 1 (0 if there is no such cell), and a text."""
+    """A message about a cell, with the line and the column of the text where the cell begins, counted from 1.
+
+    In a workbook, `line` and `column` are 0.
+    """
 
     line: int
     column: int
@@ -62,7 +65,7 @@ class Problem(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line of a table: its number, counted from 1 in the text or in the sheet of a workbook, and its text."""
+    """A line of a table. Lines are counted from 1, in the text or in the sheet of a workbook."""
 
     number: int
     text: str
@@ -73,7 +76,7 @@ class Line(NamedTuple):
         return f"sheet {self.sheet!r}, row {self.number}" if self.sheet else f"line {self.number}"
 
     def problem(self, column: int, what: str) -> Problem:
-        """Return a problem at the cell with the given index. In a workbook, the text names the sheet and the row."""
+        """Return a problem of the cell with the index `column`. In a workbook, the message names the sheet and row."""
         if self.sheet:
             return Problem(0, 0, f"{self}: {what}")
         place = 0
@@ -84,7 +87,7 @@ class Line(NamedTuple):
 
 
 class TableError(DataError):
-    """An error in a table that cannot be used; it contains the name of the file and all problems."""
+    """A table that cannot be used. The message contains the name of the file and all problems."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         super().__init__(source, tuple(problems))
@@ -99,10 +102,10 @@ class TableError(DataError):
 class Sheet:
     """A table as text.
 
-    `cells` has the shape (rows, columns); all numbers in it have decimal points. `lines` contains the line from which
-    each row was read. `names` and `units` are as written, and empty if the table lacks them. `head` is the line of
-    names, or the first row of numbers if there are no names. `notes` are the first cells of the lines of text below the
-    numbers.
+    `cells` has the shape (rows, columns), and its numbers have decimal points. `lines` contains the line from which
+    each row was read. `names` is empty if the table has no names. `units` has an empty text for a column without a
+    unit. `head` is the line of names, or the first row of numbers if there are no names. `notes` contains the first
+    cell of each line of text below the numbers.
     """
 
     source: str
@@ -115,7 +118,7 @@ class Sheet:
 
     @property
     def remark(self) -> str:
-        """A text that lists the lines that follow the numbers and are not read; empty if there are no such lines."""
+        """A text that lists the lines below the numbers, or an empty text if there are no such lines."""
         shown = dict.fromkeys(repr(text[:60]) for text in self.notes)
         return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
 
@@ -123,8 +126,8 @@ class Sheet:
 class Read(dict[str, FloatArray]):
     """The columns that were read from a table, by `Column.name`, in SI.
 
-    `headings` are the names as written. `remark` names the columns and lines of the table that were not used. `unused`
-    contains, by name, the unit as written and the numbers of each column that was not used.
+    `headings` contains the name of each column as written in the table. `remark` names the columns and lines of the
+    table that were not used. `unused` maps the name of each unused column to its unit and its numbers.
     """
 
     headings: Mapping[str, str] = {}
@@ -133,7 +136,7 @@ class Read(dict[str, FloatArray]):
     unused: Mapping[str, tuple[str, FloatArray]] = {}
 
     def leave_out_incomplete(self) -> None:
-        """Leave out the rows in which a number is missing, and count them in `remark`."""
+        """Remove the rows in which a number is missing, and state the number of removed rows in `remark`."""
         known = np.isfinite(np.array([*self.values()])).all(axis=0)
         if known.all():
             return
@@ -145,12 +148,12 @@ class Read(dict[str, FloatArray]):
 
 
 def is_table(path: str | Path) -> bool:
-    """Return whether a path is a file that may contain a table: any file except a campaign and a published study."""
+    """Return whether a path is a file other than a campaign or a published study, and so may contain a table."""
     return Path(path).is_file() and Path(path).suffix not in (".yaml", ".zip")
 
 
 def decoded(content: bytes, source: str) -> str:
-    """Return the text of a table: UTF-8, UTF-16, Windows-1252, or the cells of an Excel workbook."""
+    """Return the content of a text file in UTF-8, UTF-16 or Windows-1252, or of an Excel workbook, as text."""
     if content[:4] == b"PK\x03\x04":
         return _workbook(content, source)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -169,7 +172,7 @@ def decoded(content: bytes, source: str) -> str:
 
 
 def _workbook(content: bytes, source: str) -> str:
-    """Return the cells of all sheets of a workbook, separated by tabs."""
+    """Return all sheets of a workbook as one text, with tabs between the cells."""
     import pandas as pd
 
     try:
@@ -190,15 +193,15 @@ def _workbook(content: bytes, source: str) -> str:
 
 
 def _decimals(text: str) -> str:
-    """Return the marks that may be the decimal mark of a number: ``,`` for 30,0, and both for 3,158."""
+    """Return the possible decimal marks of a number, such as ``,`` for ``30,0`` and ``.,`` for ``3,158``."""
     return "".join(mark for mark, form in _DECIMALS.items() if re.fullmatch(form, text))
 
 
 def _of_workbook(cell: object, kinds: set[str]) -> str:
-    """Return a cell as text on one line. `kinds` are the decimal marks that are certain in other texts of the workbook.
+    """Return a cell as text on one line, with decimal points as in the numbers of a workbook.
 
-    A decimal comma in a text such as ``30,0`` becomes a decimal point, because numbers of a workbook have one. A text
-    such as ``3,158`` is only a number if the decimal mark of other texts is certain.
+    `kinds` contains the decimal marks of all texts in the workbook that have only one possible mark. A text such as
+    ``3,158`` has two possible marks, and is read as a number only if `kinds` contains exactly one mark.
     """
     text = " ".join(str(cell).split())
     kind = _decimals(text) if isinstance(cell, str) else ""
@@ -231,9 +234,10 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Return the separator that splits most lines into several numbers; if none does, the most frequent separator.
+    """Return the separator that splits the largest number of lines into several numbers.
 
-    Lines split by commas or blanks count half, because commas also occur in numbers, and blanks before units.
+    If no separator splits a line into numbers, return the separator that occurs in the largest number of lines. Lines
+    split by commas or blanks count half, because commas also occur inside numbers, and blanks also occur before units.
     """
 
     def has_numbers(line: str, mark: str) -> bool:
@@ -257,9 +261,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     """Find the names, the units and the lines of numbers of a table.
 
     Text above the names and below the numbers is left out. A table may consist of several blocks of numbers, each below
-    the same line of names. If a temperature is stated above each block, the temperatures become a further column. Also
-    groups of columns side by side, with the same names and a temperature above each group, become one table. For a
-    table whose cells may be words, the caller gives `is_name`, which returns whether a text is the name of a column.
+    the same line of names. If a temperature is stated above each block, the temperatures become a further column.
+    Groups of columns with the same names that stand side by side are joined one below the other. If cells may be words,
+    the caller must give the function `is_name`, which returns whether a text is the name of a column.
     """
     grid = _grid(source, _lines(text))
     head = _head_of_words(grid, is_name) if is_name else _head(grid)
@@ -287,10 +291,10 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """The cells of a text as an array, with three masks: of filled cells, of numbers, and of words.
+    """The cells of a text as an array, with masks of the filled cells, of the numbers and of the words.
 
-    `length` is the number of cells of each line, before short lines are filled up with empty cells. A `word` is neither
-    a number nor a mark of a missing number.
+    `length` contains the number of cells of each line in the text. In `cells`, short lines are filled up with empty
+    cells. A word is a filled cell that is neither a number nor a mark of a missing number.
     """
 
     source: str
@@ -302,13 +306,13 @@ class _Grid:
     word: BoolArray
 
     def require(self, wrong: Sequence[int], column: int, what: str) -> None:
-        """Raise TableError if there are wrong lines: the message shows the first of them and states how many follow."""
+        """Raise TableError if `wrong` contains lines. The message shows the first line and counts the other lines."""
         if len(wrong):
             raise TableError(self.source, [self.lines[wrong[0]].problem(column, what + _further(len(wrong)))])
 
 
 def _further(count: int) -> str:
-    """Return a text that states in how many further lines a problem occurs."""
+    """Return a text such as `` (and in 2 more lines)`` for a problem in 3 lines."""
     return f" (and in {count - 1} more line{'s' if count > 2 else ''})" if count > 1 else ""
 
 
@@ -337,10 +341,10 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
 
 
 class _Head(NamedTuple):
-    """The lines of the names, of the units and of the labels above pairs of columns; None if there is no such line.
+    """The indices of the line of names, of the line of units, and of the line of labels above groups of columns.
 
-    `numeric` is a mask of the columns of numbers, and `data` a mask of the lines of numbers. The numbers begin at or
-    below the line `begin`.
+    An index is None if the table has no such line. `numeric` is a mask of the columns of numbers, and `data` is a mask
+    of the lines of numbers. Numbers are read from the line `begin` on.
     """
 
     names: int | None
@@ -354,10 +358,10 @@ class _Head(NamedTuple):
 def _head(grid: _Grid) -> _Head:
     """Find the names and units in the lines of text above the numbers.
 
-    Only lines with as many cells as most lines of numbers are considered; if there is no such line, the last line above
-    the numbers contains the names. If the last considered line has names with units, no other line has units of these
-    columns. If a considered line other than the first contains units, the names are in the considered line above it.
-    Otherwise the last considered line contains the names, and the one above it may be units.
+    A candidate is a line with as many cells as most lines of numbers. Without candidates, the last line above the
+    numbers contains the names. If the last candidate contains names with units, there is no line of units. If a
+    candidate other than the first is a line of units, the candidate above this line contains the names. Otherwise the
+    last candidate contains the names, and the candidate above the names may be the line of units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -383,10 +387,10 @@ def _head(grid: _Grid) -> _Head:
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     """Return masks of the lines and of the columns that contain numbers.
 
-    Among lines with the most frequent number of cells, at least half must have a number in a numeric column. A line
-    contains numbers if at least half of its filled cells in numeric columns are numbers or marks of missing numbers. A
-    line that begins with a word is text if the word is in a numeric column, or if less than half of the columns are
-    filled. If such a line is shorter than most lines, it is text even if exactly half of the columns are filled.
+    A column is numeric if at least half of the lines with the most frequent number of cells have a number in this
+    column. A line contains numbers if at least half of its filled cells in numeric columns are numbers or marks of
+    missing numbers. A line that begins with a word is text if the word is in a numeric column, or if less than half of
+    the columns are filled. With exactly half of the columns filled, the line is text if most lines have more cells.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # every line has more words than numbers
@@ -406,7 +410,7 @@ def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
 
 
 def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
-    """Find the names of a table whose entries may be words: the first line with a known name."""
+    """Find the line of names of a table whose cells may be words: the first line with a known name."""
     count = len(grid.cells)
     names = next((row for row in range(count) if any(is_name(split_unit(cell)[0]) for cell in grid.cells[row])), 0)
     grid.require([names] if grid.number[names].any() else [], 0, "expected a line of names")
@@ -418,9 +422,9 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 
 
 def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
-    """Return the positions of the lines of numbers, the temperature stated above each, and the notes below them.
+    """Return the indices of the lines of numbers, the temperature stated above each line, and the notes at the end.
 
-    Text between two lines of numbers must contain the line of names; otherwise TableError is raised.
+    TableError is raised for text between two lines of numbers, unless this text repeats the line of names.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []
@@ -448,7 +452,7 @@ def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | N
 
 
 def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
-    """Return the last temperature in lines of text, with its unit, or None if they contain no temperature."""
+    """Return the last temperature in the lines `rows`, with its unit, or None if the lines contain no temperature."""
     found = [each for row in rows for each in _STATED.finditer(" ".join(grid.cells[row]))]
     return (found[-1][1].replace(",", "."), in_degrees(found[-1][2].replace(" ", ""))) if found else None
 
@@ -464,7 +468,7 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
 
 
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
-    """Raise TableError if a line lacks a number, or has more cells than there are names."""
+    """Raise TableError if a line ends before the last column of numbers, or has more cells than the table has names."""
     first = grid.lines[rows[0] if head.names is None else head.names]
     blanks = width > head.numeric.size and first.separator == BLANKS  # a name that contains a blank became two cells
     wrong = [
@@ -484,9 +488,9 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
 
 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
-    """Return the cells of `rows`, and rewrite their numbers with decimal points and without marks between thousands.
+    """Return the cells of `rows`, with all numbers written with decimal points and without marks between thousands.
 
-    If some numbers have a decimal point and others a decimal comma, TableError is raised.
+    TableError is raised if some numbers have a decimal point and other numbers have a decimal comma.
     """
     cells, number = grid.cells[rows], grid.number[rows]
     texts: list[str] = cells[number].tolist()
@@ -511,9 +515,10 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 
 
 def _from_groups(grid: _Grid, sheet: Sheet, labels: int | None, groups: IntArray) -> Sheet:
-    """Join groups of columns side by side: their rows follow one another. `groups` has the places of each group.
+    """Join groups of columns into one group, in which the rows of the second group follow the rows of the first group.
 
-    The temperature in the label above each group becomes a further column, unless each group has such a column.
+    `groups` contains the indices of the columns of each group. If the groups have no column of temperatures, the
+    temperature in the label above each group becomes a further column.
     """
     names, units = ([each[place] for place in groups[0]] for each in (sheet.names, sheet.units))
     extra: list[list[str]] = [[] for _ in groups]
@@ -538,7 +543,7 @@ def _from_groups(grid: _Grid, sheet: Sheet, labels: int | None, groups: IntArray
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether at least half of the words of a line are units, or all of them are in square brackets."""
+    """Return whether at least half of the filled cells of a line are units, or all are in square brackets."""
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
     # a text such as "10 mm" is a value and not a unit, but "10^3 um^3" is a unit
     texts = [text for text in filled if re.match(r"(?!\d)|10\s*[\^⁰¹²³⁴-⁹]|1e", text)]
@@ -547,11 +552,11 @@ def _are_units(row: Sequence[str]) -> bool:
 
 
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
-    """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
+    """Return, for each column of the sheet, its `Column`, its unit, and whether its entries are common logarithms.
 
-    The meaning is one of `columns`, or None. In a table without names, the meanings are `columns` in this order. If the
-    table has none of the names of a needed column, the column is recognised by its dimension. This requires that only
-    one unknown column of the table, and only one of `columns`, has this dimension.
+    The `Column` is one of `columns`, or None for an unknown column of the sheet. In a sheet without names, `columns`
+    describes the columns of the sheet in order. If no name in the sheet means a needed `Column`, an unknown column
+    with its dimension is taken. This requires that no second unknown column and no second `Column` has this dimension.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -589,10 +594,10 @@ def read_table(
 ) -> Read:
     """Read the requested columns of a table in SI, each of shape (rows,).
 
-    Columns without names must be in the order of `columns`. If `allow_missing` is true, entries without a digit become
-    NaN. A TableError contains at most one problem of each column. `ways` are names of columns of which the table needs
-    the first, or the second, and so on. The first of the `ways` that is complete is read. The columns of the others
-    are then not used.
+    A table without names must have its columns in the order of `columns`. If `allow_missing` is true, entries without
+    a digit become NaN. A TableError contains at most one problem of each column. `ways` contains groups of column
+    names, and the table must contain all columns of at least one group. The first complete group is read, and columns
+    that belong only to other groups are not used.
     """
     sheet, read, problems = read_sheet(text, source), Read(), []
     meanings = matched(sheet, columns)
@@ -652,14 +657,14 @@ def read_table(
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return the names of columns as a text, with a remedy if there is a column for each temperature."""
+    """Return the names of columns as a text. If a name contains a temperature, add a hint to rewrite the table."""
     by_temperature = any(re.search(_TEMPERATURE, name) for name in names)
     hint = " (write the temperatures into a column of their own, and these columns one below the other)"
     return (", ".join(filter(None, names))[:200] or "no names") + hint * by_temperature
 
 
 def _unit(written: str, column: Column) -> str:
-    """Return the unit of a column after checking its dimension; empty for a pure number without a unit."""
+    """Return the unit of a column, or an empty text for pure numbers. Raise ValueError for a wrong or missing unit."""
     unit = written or column.given_unit
     if unit in ("-", "1") and column.unit == "1":
         return ""
@@ -678,7 +683,7 @@ def _unit(written: str, column: Column) -> str:
 def _values(
     sheet: Sheet, place: int, column: Column, unit: str, is_logarithm: bool, allow_missing: bool
 ) -> tuple[FloatArray, list[Problem]]:
-    """Return the values of a column in SI, and a list with the first problem (empty if there is none)."""
+    """Return the values of a column in SI, and a list that contains the first problem or is empty."""
     values, wrong = np.full(len(sheet.cells), np.nan), []
     before, factor, zero = factors(unit, column.unit)
 
@@ -714,13 +719,13 @@ def _values(
 
 
 def _values_or_nan(cells: Cells) -> FloatArray:
-    """Return cells as numbers; a cell that is not a number becomes NaN."""
+    """Return cells as numbers, with NaN for cells that are not numbers."""
     texts: list[str] = cells.ravel().tolist()
     return np.array([float(text) if _NUMBER.fullmatch(text) else math.nan for text in texts]).reshape(cells.shape)
 
 
 def numbers(sheet: Sheet) -> FloatArray:
-    """Return the entries of a table as numbers; entries without a digit and columns of words are NaN."""
+    """Return the cells of a table as numbers, with NaN for cells without a digit and for columns without numbers."""
     values = _values_or_nan(sheet.cells)
     is_numeric = ~np.all(np.isnan(values), axis=0)
     wrong = [
@@ -735,7 +740,7 @@ def numbers(sheet: Sheet) -> FloatArray:
     return values
 
 
-#: A table without names and with more columns than this is described as a map. Otherwise each column is described.
+#: `described` treats a table without names and with more columns than this as a map.
 MOST_DESCRIBED = 6
 
 

@@ -16,8 +16,8 @@ from mdr_dask.errors import distinguishable, similar
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: Units in the syntax of pint; angles have a dimension. Pint's own list takes ten times as long to load, and contains
-#: units with one-letter names (``c``, ``e``, ``M``), which in a campaign are more likely to be mistakes.
+#: Units in the syntax of pint. Angles have a dimension. Pint's own list takes ten times as long to load. Units
+#: with one-letter names (``c``, ``e``, ``M``) in that list would mostly be mistakes in a campaign.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -112,12 +112,12 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Pint may need extremely long to parse texts of more than `_MOST_LETTERS` characters and exponents of three digits.
+#: Pint may take extremely long to parse a text of more than `_MOST_LETTERS` characters, or an exponent of three digits.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
-#: A factor before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``, or without a unit, as in ``10^3`` or
-#: ``x 1000``. The number in ``mu (10)`` is no factor: it may be a condition.
+#: A factor before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``, or a factor without a unit, as in
+#: ``10^3`` or ``x 1000``. The number in ``mu (10)`` is not a factor, because this number may be a condition.
 _POWER = r"10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?e[+-]?\d+"
 _FACTOR = re.compile(
     rf"([x×*]\s*\d+|{_POWER})\Z|[x×*]?\s*({_POWER}|\d+(?:\.\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE
@@ -141,9 +141,9 @@ COMMON = (
 
 
 def to_si(value: str, unit: str) -> float:
-    """Convert a number with its unit, such as ``"20 mm"``, to a coherent SI unit; raise ValueError with a message.
+    """Convert a number with its unit, such as ``"20 mm"``, to the SI unit `unit`, or raise ValueError.
 
-    A number without a unit is in SI. Decimal units are rounded correctly: ``"1.1 mm"`` is 0.0011, not 1.1 x 0.001.
+    A number without a unit is in SI. Units that are powers of ten cause no rounding error, so ``"1.1 mm"`` is 0.0011.
     """
     match = _QUANTITY.match(value)
     if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):
@@ -163,13 +163,13 @@ def to_si(value: str, unit: str) -> float:
 
 
 def unit_behind(value: str) -> str:
-    """Return the unit after a number in a text, or an empty text if the number has no unit."""
+    """Return the unit that follows the number in a text, or an empty text if no unit follows."""
     match = _QUANTITY.match(value)
     return match[2] if match and match[2] and is_unit(match[2]) else ""
 
 
 def spelt(value: str) -> str:
-    """Return a hint for a text that is not a number: how to write a decimal point, a list or a range."""
+    """Return a hint on how to write a decimal point, a list or a range, for a text that is not a number."""
     if _THOUSANDS.fullmatch(value.strip()):
         return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
     if _COMMA.match(value):
@@ -180,7 +180,7 @@ def spelt(value: str) -> str:
 
 
 def expected(unit: str, usual: str = "") -> str:
-    """Return the name of a quantity with an example, for a message: ``a length (such as '20 mm')``."""
+    """Return the name of a quantity with an example, as in ``a length (such as '20 mm')``."""
     spaced = unit.replace("*", " ").replace("**", "^")
     other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
     name, example = _MEANINGS.get(spaced) or other
@@ -194,7 +194,7 @@ _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
 def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
-    """Return a quantity as text in the unit `written`, or by default like ``0.5 mm/s`` or ``-20 degC``."""
+    """Return a quantity as text in the unit `written`, or else in a readable unit, as in ``0.5 mm/s``."""
     if written:
         factor, zero = conversion(written, unit)
         return f"{(value - zero) / factor:.{digits}g} {written}"
@@ -213,12 +213,12 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
 
 
 def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a quantity and its limits as texts, with as many digits as are needed to distinguish them."""
+    """Return a quantity and its limits as texts, with enough digits to distinguish the quantity from each limit."""
     return distinguishable(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
 
 
 def seconds(duration: float) -> str:
-    """Return a duration in s as text: ``0.5 s``, ``2 min 5 s``, ``3 h 20 min``."""
+    """Return a duration, given in s, as text such as ``0.5 s``, ``2 min 5 s`` or ``3 h 20 min``."""
     if duration < 60:
         return f"{duration:.2g} s" if duration < 10 else f"{duration:.0f} s"
     minutes, rest = divmod(round(duration), 60)
@@ -229,15 +229,16 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: ``check`` asks about a number without a unit if it differs from the usual value by more than this number of decades.
+#: ``check`` asks about numbers without a unit that differ from the usual value by more than this number of decades.
 _FAR = 3.0
 
 
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
-    """Return whether a number without a unit may have been meant in another unit than the SI unit.
+    """Return whether a number without a unit may have been meant in a unit other than the SI unit.
 
-    A number with a dimension is doubtful if it differs from the first of the `usual` values by more than 3 decades. Any
-    number is also doubtful if the unit of one of the `usual` values brings it nearer to the first usual value.
+    A number with a dimension is doubtful if the number differs from the first of the `usual` values by more than 3
+    decades. Any number is also doubtful if the unit of one of the `usual` values would bring the number nearer to the
+    first usual value.
     """
     if value == 0:
         return False
@@ -248,10 +249,10 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
 
 
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
-    """Return a number with the unit in which it was probably meant, or an empty text.
+    """Return a number with the unit in which the number was probably meant, or an empty text.
 
-    Among the units of the `usual` values, the unit that brings the number nearest to the first usual value is chosen,
-    but none if the number then still differs from this value by more than 3 decades.
+    Of the units of the `usual` values, the unit is chosen that brings the number nearest to the first usual value. The
+    text is empty if the number in this unit still differs from the first usual value by more than 3 decades.
     """
     found = {}
     for each in usual:
@@ -268,7 +269,7 @@ def _decades(value: float, unit: str, usual: str) -> float:
 
 
 def example_unit(unit: str) -> str:
-    """Return a common unit instead of an SI unit, such as MPa for Pa."""
+    """Return the common unit of a quantity with the given SI unit, such as MPa for Pa."""
     return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
 
 
@@ -308,7 +309,7 @@ def registry() -> UnitRegistry[Any]:
 
 @lru_cache(maxsize=1024)
 def conversion(given: str, unit: str) -> tuple[float, float]:
-    """Return `factor` and `zero` of a unit: ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`."""
+    """Return `factor` and `zero`, with which ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`."""
     from pint.errors import DimensionalityError, UndefinedUnitError
 
     units, wanted = registry(), "a pure number" if unit == "1" else expected(unit)
@@ -335,7 +336,7 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
 
 
 def converts(given: str, unit: str) -> bool:
-    """Return whether a text is a unit that can be converted to another unit."""
+    """Return whether the text `given` is a unit that can be converted to `unit`."""
     try:
         conversion(given, unit)
     except ValueError:
@@ -358,19 +359,19 @@ def dimension_of(unit: str) -> tuple[Any, str]:
 
 
 def in_degrees(unit: str) -> str:
-    """Return ``degC`` or ``degF`` for other spellings of these units, such as ``C``, ``℃`` and ``deg C``."""
+    """Return ``degC`` for ``C``, ``℃`` or ``deg C``, ``degF`` for such spellings of degF, and other units unchanged."""
     found = _DEGREES.fullmatch(unicodedata.normalize("NFKC", unit.replace("º", "°")).strip())
     return f"deg{(found[1] or found[2]).upper()}" if found else unit
 
 
 def _factor_and_unit(text: str) -> tuple[float, str]:
-    """Return the number before a unit, or 1, and the unit in the spelling of pint: ``mm^3`` for ``mm³`` or ``mm3``."""
+    """Return the factor before a unit (1 if there is none), and the unit as pint spells it, such as ``mm^3``."""
     text = re.sub(r"[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+", lambda power: "^" + unicodedata.normalize("NFKC", power[0]), text)
     text = unicodedata.normalize("NFKC", text.replace("º", "°").replace("%", " percent ")).strip()
     found = _FACTOR.match(text)
     number = re.sub(r"^10\s*\^\s*", "1e", found[found.lastindex or 1].lstrip("x×X* ")) if found else "1"
     unit = text[found.end() :] if found else text
-    unit = re.sub(r"^(HV|HBW?)\s?\d+([.,/]\d+)*$", r"\1", unit)  # the number after a hardness is the test load: HV10
+    unit = re.sub(r"^(HV|HBW?)\s?\d+([.,/]\d+)*$", r"\1", unit)  # 10 in HV10 is the test load
     unit = unit.replace("−", "-").replace("·", " ").replace("microns", "micron")
     unit = re.sub(r"(?<=[A-Za-zμ])\^?\{?(-?\d{1,2})\}?(?!\d)", r"^\1", unit)
     unit = in_degrees(unit)
@@ -379,7 +380,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint with the known unit (of the dimension of `unit`, if given) whose spelling is nearest to a word."""
+    """Return a hint with the unit in `COMMON` most similar to a word and, if `unit` is given, with its dimension."""
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"

@@ -22,7 +22,7 @@ SOME = 64
 
 @dataclass(frozen=True)
 class Spread:
-    """An interval from which values are taken. Either the values or their logarithms are evenly spaced."""
+    """An interval of values, on a logarithmic scale if `geometric` is true and on a linear scale otherwise."""
 
     low: float
     high: float
@@ -49,7 +49,7 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Round a number: to a whole number if `whole` is true, not at all if `exact` is true, otherwise to 14 digits."""
+    """Round a number to a whole number if `whole` is true. Otherwise round to 14 digits, unless `exact` is true."""
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -63,7 +63,7 @@ class Axis:
     path: str
     # Name of the axis's coordinate in the store: the path with ``_`` for ``.``.
     name: str
-    # Dimension of the axis in the store. In a grid this is `name`; if parameters vary together, it is ``case``.
+    # Dimension of the axis in the store: `name` in a grid, and ``case`` if parameters vary together.
     dim: str
     # Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     values: tuple[Any, ...]
@@ -100,7 +100,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted relative error and absolute error; an error may exceed one of them, but not both."""
+    """The largest accepted relative error and absolute error. One of the two limits may be exceeded, but not both."""
 
     relative: float = 0.0
     absolute: float = 0.0
@@ -111,18 +111,18 @@ class Tolerance:
 class Refinement:
     """The rule by which a study chooses the values of an adaptive axis."""
 
-    # The interval of the axis. Its scale, linear or logarithmic, is also used to interpolate the outputs.
+    # The interval of the axis. The scale of the interval is also used to interpolate the outputs.
     spread: Spread
-    # Largest accepted interpolation error of each output; a relative error refers to the largest value along the axis.
+    # Largest accepted interpolation error of each output. A relative error refers to the largest value along the axis.
     until: Mapping[str, Tolerance]
     at_most: int
 
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case: a first round, and further rounds until every tolerance is met."""
+    """The number of realisations of each case, and the tolerances that end the rounds."""
 
-    # Number of realisations in the first round, and largest number in all rounds together.
+    # Number of realisations in the first round, and largest number of realisations in all rounds together.
     at_least: int
     at_most: int
     # Largest accepted standard error of the mean of each output.

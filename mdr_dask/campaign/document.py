@@ -19,8 +19,8 @@ from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50  # largest number of nesting levels; a campaign has at most ten, and Python fails at about 1000
-_LARGEST = 200_000  # largest number of values in a file; with YAML aliases, a short text can stand for billions
-_LONGEST = 300_000  # largest number of characters in a file; reading so many takes about a second
+_LARGEST = 200_000  # largest number of values in a file; with aliases, a short text can stand for billions of values
+_LONGEST = 300_000  # largest number of characters in a file; reading them takes about a second
 _TOO_DEEP = "too deeply nested, too many values, or an alias that contains itself"
 _MOST_DIGITS = 300  # largest number of digits of a number; a double has at most 309 before its decimal point
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
@@ -40,7 +40,7 @@ class Document:
     _keys: dict[Path, Node] = field(default_factory=dict)
 
     def place(self, path: Path) -> Place:
-        """Return the position of the value at a path or, if it is missing, of the mapping or list around it."""
+        """Return the position of the value at a path, or of the mapping or list around a missing value."""
         while path not in self._nodes and path:
             path = path[:-1]
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
@@ -62,7 +62,7 @@ class Document:
 
 
 def read_text(path: str | FilePath) -> str:
-    """Return the text of a YAML file; raise CampaignError if the file cannot be read or is not UTF-8."""
+    """Return the text of a YAML file. Raise CampaignError if the file cannot be read or is not UTF-8."""
     try:
         return FilePath(path).read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -134,7 +134,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Raised after a problem was reported, to stop reading a document that is too large or has an endless alias."""
+    """The signal to stop reading a document, after a problem of its size or nesting was reported."""
 
 
 class _Reader:

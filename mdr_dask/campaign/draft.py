@@ -42,7 +42,7 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 
 
 def draft(name: str, model: Model[Any], file: str) -> str:
-    """Return the text of a campaign file. It passes every check if the model needs no data file."""
+    """Return the text of a campaign file. The file passes every check, unless the model needs a data file."""
     short = name.partition(":")[2].lower() if ":" in name else name
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
     head = _HEAD.format(summary=summary, file=file, name=short, model=name)
@@ -54,7 +54,7 @@ def draft(name: str, model: Model[Any], file: str) -> str:
 
 
 def _entries(parameters: type[Parameters]) -> Iterator[str]:
-    """Yield the lines of all parameters; the lines of optional parameters are comments."""
+    """Yield the lines of all parameters. The lines of optional parameters are comments."""
     needed = _needed(parameters)
     written: dict[str, None] = {}
     for group in parameters.alternatives:
@@ -70,7 +70,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the dotted names of the required parameters and of the first member of each group of alternatives."""
+    """Return the dotted names of the required parameters, and of the parameters in each group's first alternative."""
     groups = getattr(parameters, "alternatives", ())
     return {*fields.required(parameters), *(name for group in groups for name in group[0])}
 
@@ -105,7 +105,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return examples of a parameter set: one for each alternative in its first group of alternatives, or else one."""
+    """Return one example of a parameter set, or one for each alternative in its first group of alternatives."""
     group = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]
@@ -139,7 +139,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return a number within the bounds of a field: 1 if possible."""
+    """Return 1, or another number within the bounds of a field if 1 is not within the bounds."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

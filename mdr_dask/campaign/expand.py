@@ -33,7 +33,7 @@ def expand(
     directory: str,
     outputs: Sequence[str],
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series without problems, and remarks for the user; add the problems of other series to the document.
+    """Return the series without problems, and remarks for the user. Add the problems of other series to `document`.
 
     Names of files are relative to `directory`.
     """
@@ -149,7 +149,7 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Check each value of one axis with the first values of all other axes; return None if a value is wrong."""
+        """Return the values of one axis, checked with the first values of other axes, or None if a value is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         # the problems of another axis are reported when the values of that axis are checked
@@ -180,7 +180,7 @@ class _Expansion:
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
     ) -> list[list[Any] | None]:
-        """Return, for each varied parameter, its checked values in all cases; ``[None]`` if any value is wrong."""
+        """Return, for each varied parameter, its checked values in all cases, or ``[None]`` if a value is wrong."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         are_independent = all(fields.is_independent(self.parameters, one.path, self.data) for one in variations)
         cases = list(zip(*(one.items for one in variations), strict=False))

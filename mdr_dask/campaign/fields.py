@@ -1,4 +1,4 @@
-"""Types, units and nested parameter sets of the fields of parameter sets. The fields are keys of a campaign file."""
+"""The fields of a parameter set: types, units and nested sets. Each field is a key of a campaign file."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a single value of this field is a list. In other fields, a list contains the values of an axis."""
+    """Return whether a single value of this field is a list, so that a list does not mean the values of an axis."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
 
 def usual(info: FieldInfo) -> tuple[str, ...]:
-    """Return the usual values that a field declares, with their units; ``mdr-dask init`` writes the first one."""
+    """Return the usual values of a field with their units. ``mdr-dask init`` writes the first value."""
     return tuple(map(str, info.examples or ()))
 
 
@@ -64,7 +64,7 @@ def listed(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, return the set whose names of fields are most similar to the keys of the mapping.
+    If several sets fit, return the set whose field names are most similar to the keys of the mapping.
     """
     if not isinstance(value, dict):
         return None
@@ -77,7 +77,7 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
 
 
 def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
-    """Return how many keys of a mapping are names of fields of a parameter set, and how many resemble such a name."""
+    """Return how many keys of a mapping are field names of a parameter set, and how many resemble a field name."""
     keys = [str(key) for key in value]
     return (
         sum(key in kind.model_fields for key in keys),
@@ -86,7 +86,7 @@ def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the fields of a parameter set that have only one possible value, with this value."""
+    """Return the name and the value of each field of a parameter set that has only one possible value."""
     return {
         key: get_args(info.annotation)[0]
         for key, info in kind.model_fields.items()
@@ -100,7 +100,7 @@ def required(kind: type[BaseModel]) -> list[str]:
 
 
 def written(kind: type[BaseModel], values: Mapping[str, str]) -> str:
-    """Return a parameter set with the given values as text on one line: ``{shape: power, radius: ...}``."""
+    """Return a parameter set with the given values as text on one line, such as ``{shape: power, radius: ...}``."""
     texts = {**values, **fixed(kind)}
     return "{" + ", ".join(f"{key}: {texts[key]}" for key in kind.model_fields if key in texts) + "}"
 
@@ -150,7 +150,7 @@ def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
 
 
 def plain(number: float) -> str:
-    """Return a number as a short text: a whole number in full, any other with at most 12 digits."""
+    """Return a number as text. Whole numbers are written in full, and other numbers with at most 12 digits."""
     return str(number) if isinstance(number, int) else f"{number:.12g}"
 
 

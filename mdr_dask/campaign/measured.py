@@ -1,4 +1,4 @@
-"""Read a table of measured points: some columns are conditions of a study, and one column is an output of it."""
+"""Read a table of measured points: columns with conditions of a study, and a column with an output of the study."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from mdr_dask.tables import AGREE, Line, Read, Sheet, listed, matched, read_shee
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
-#: Names of errors in a heading, such as ``std``. They stand before or after the name of an output, or alone.
+#: Names of errors in a heading, such as ``std``. An error stands before or after the name of an output, or alone.
 _ERROR = re.compile(
     r"(?<!\w)(?:(?:std?|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|sem?)(?!\w)"
     r"|[σ±]|\+ ?/?"
 )
 #: Largest size of a table of measured points, in characters. The table is stored with the study.
 LARGEST = 10**6
-#: Conditions are equal if their relative difference is at most this.
+#: Two values of a condition count as equal up to this relative difference.
 SAME = 1e-6
 #: The reason why the fit refuses a table with errors that are zero.
 ZERO = "the fit needs standard errors above 0: delete the column of errors, so that the fit estimates them"
@@ -37,10 +37,10 @@ FEW = 3
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured points in SI; each array has the shape (points,).
+    """Measured points in SI. Each array has the shape (points,).
 
-    `errors` are standard errors of `values`, read from the column `error_column`. The keys of `conditions` are names of
-    coordinates of the store. `remark` names unused columns and counts rows that lack a number.
+    `errors` are the standard errors of `values`, and `error_column` describes the column of errors. The keys of
+    `conditions` are names of coordinates of the store. `remark` names unused columns, and counts rows without a number.
     """
 
     source: str
@@ -62,12 +62,12 @@ def read_measured(
     wanted: Collection[str] = (),
     least: Mapping[str, float] | None = None,
 ) -> Measured:
-    """Read a table of measured points. `conditions` and `outputs` map names of possible columns to their SI units.
+    """Read a table of measured points. `conditions` and `outputs` map names of possible columns to SI units.
 
-    If the table contains several outputs, the one among `wanted` is read. A heading may be short for a name:
-    ``temperature`` means ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An
-    axis without a column is an unknown parameter. DataError is raised if the numbers of an unused column lie within the
-    range of such an axis, because the column may be meant for this axis. `least` contains lower bounds of conditions.
+    If the table contains several outputs, the output in `wanted` is read. A heading such as ``temperature`` may be
+    short for ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An axis without a
+    column is an unknown parameter. DataError is raised if all numbers of an unused column lie in the range of an
+    unknown parameter, because the column may be misnamed. `least` contains lower bounds of conditions.
     """
     sheet = read_sheet(text, source)
     units = {**outputs, **conditions}
@@ -108,9 +108,9 @@ def read_measured(
 
 
 def belonging(values: FloatArray, known: ArrayLike) -> FloatArray:
-    """Return the nearest known value of each value; NaN if they differ by more than `tables.AGREE`.
+    """Return the known value nearest to each value, or NaN if the relative difference exceeds `tables.AGREE`.
 
-    An instrument does not measure exactly the value that was set: 49.9 % belongs to 50 %.
+    For example, a measured value of 49.9 % belongs to the set value of 50 %.
     """
     set_values = np.atleast_1d(np.asarray(known, dtype=np.float64))
     near = set_values[np.argmin(np.abs(values[:, None] - set_values), axis=1)]
@@ -118,7 +118,7 @@ def belonging(values: FloatArray, known: ArrayLike) -> FloatArray:
 
 
 def scatter(measured: Measured, known: Mapping[str, ArrayLike]) -> Iterator[str]:
-    """Yield a sentence for each condition whose measured values are near the known values, but not equal to them."""
+    """Yield a sentence for each condition with measured values that are near, but not equal to, a known value."""
     for name, values in known.items():
         rows = measured.conditions[name]
         away = np.abs(rows - (near := belonging(rows, values)))
@@ -132,11 +132,11 @@ def scatter(measured: Measured, known: Mapping[str, ArrayLike]) -> Iterator[str]
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
-    """Return the headings of the columns with errors of the output, their unit, and whether the errors are relative.
+    """Return the headings of columns with errors of the output, the unit of the errors, and whether they are relative.
 
-    The last of `columns` is the output. The unit is empty if one of the headings states a unit. Otherwise the errors
-    have the unit of the output. Errors in percent are relative, unless the output is in percent as well. A heading
-    without a quantity, such as ``std``, belongs to the nearest known column before it.
+    The last of `columns` is the output. The unit is empty if one of the headings states a unit. Otherwise the unit
+    of the output is returned. Errors in percent are relative, unless the output is in percent as well. The heading
+    ``std``, which names no quantity, belongs to the nearest known column on its left.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):
@@ -161,7 +161,7 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return the short forms of each name, such as ``temperature`` for ``solid_temperature``.
 
-    A short form consists of the last words of a name. If several names end in these words, the short form belongs to
+    A short form consists of the last words of a name. If several names end in the same words, the form belongs to
     the name with the fewest words, or to no name if two names have equally few words.
     """
     words = [tuple(name.split("_")) for name in names]
@@ -205,7 +205,7 @@ def require_readable(table: DataFile, model: str, outputs: Sequence[str], series
 def _readings(
     table: DataFile | None, model: str, outputs: Sequence[str], series: Sequence[Series]
 ) -> Iterator[tuple[Series, Measured | DataError]]:
-    """Yield each series with its measured points, or with the reason why the table does not fit the series."""
+    """Yield each series with its measured points, or with the error that the table does not fit the series."""
     for one in series if table else ():
         assert table is not None
         try:
@@ -216,7 +216,7 @@ def _readings(
 
 
 def notes(campaign: Campaign) -> Iterator[str]:
-    """Yield notes on the measured points of each series, such as the unknowns, and rows outside the study's ranges."""
+    """Yield notes on the measured points of each series, such as its unknowns and the rows outside its ranges."""
     for series, found in _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series):
         assert campaign.measured is not None
         before = f"measured {campaign.measured.name}{f', series {series.name}' if series.name else ''}"
@@ -262,7 +262,7 @@ def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest value of each condition in a study; for a fixed parameter they are equal."""
+    """Return the smallest and the largest value of each condition in a study, also of parameters that do not vary."""
     held = {key: (value, value) for key, (value, _, _) in numbers_of(series.parameters).items()}
     coordinates = models.load(name).coordinates(series.parameters)
     held |= {key: (float(each.values.min()), float(each.values.max())) for key, each in coordinates.items()}
@@ -271,7 +271,7 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
 
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the axes of a campaign for which its table of measured points has no column."""
+    """Return the axes of a campaign for which the table of measured points has no column."""
     readings = _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series)
     found = [name for series, each in readings if isinstance(each, Measured) for name in _unknown(each, series)]
     return tuple(dict.fromkeys(found))

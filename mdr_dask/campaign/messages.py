@@ -16,8 +16,8 @@ from mdr_dask.errors import did_you_mean, similar
 from mdr_dask.models.data_file import DataFile, NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Function that adds a problem. Its arguments are the path in the data, the message, and whether the key is wrong (or
-#: else the value).
+#: Function that adds a problem. Its arguments are the path in the data, the message, and a truth value: true if the key
+#: is wrong, and false if the value is wrong.
 Report = Callable[[Path, str, bool], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
@@ -36,7 +36,7 @@ _KINDS = {
 
 
 def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
-    """Report every error of ``kind.model_validate(data)``; all errors of the same value become one message."""
+    """Report every error of ``kind.model_validate(data)``. All errors of the same value become one message."""
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
         if _is_of_another_branch(details, kind, data):
@@ -50,7 +50,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path in the data to the value with an error: the ``loc`` of pydantic without the names of types."""
+    """Return the path of a wrong value in the data. Unlike ``loc`` of pydantic, the path lacks the names of types."""
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -65,7 +65,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error comes from a parameter set other than the one that the keys of the value suggest."""
+    """Return whether an error comes from another parameter set than the set that the keys of the value suggest."""
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -106,7 +106,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """Return the path from a list to the entry that a message quotes; empty if the message quotes no entry."""
+    """Return the path from a list to the entry that a message quotes, or ``()`` if the message quotes no entry."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 
@@ -124,7 +124,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint with the unit that may be missing after a number out of bounds, or an empty text."""
+    """Return a hint with the unit that a number out of bounds may lack, or an empty text."""
     value, info, unit = value_at(data, path), fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
@@ -136,7 +136,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint for a word in place of a mapping or a list: how to write the mapping or list."""
+    """Return a hint on how to write a mapping or a list, if the user wrote a word instead."""
     value, info = value_at(data, path), fields.field_at(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -217,13 +217,13 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Describe the quantity that a field expects, with a usual value; empty for a field without a unit."""
+    """Return the name and a usual value of the quantity of a field, or an empty text for a field without a unit."""
     info, unit = fields.field_at(kind, path, data), fields.unit_at(kind, path, data)
     return expected(unit, "".join(fields.usual(info)[:1])) if info and unit else ""
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the message about an unknown key, with its new name if it was renamed, or with the most similar key."""
+    """Return the message about an unknown key, with the new name of a renamed key, or with the most similar key."""
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:

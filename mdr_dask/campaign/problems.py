@@ -13,7 +13,7 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """A position in a file; lines and columns count from 1."""
+    """A position in a file. Lines and columns count from 1."""
 
     source: str
     line: int
@@ -53,7 +53,7 @@ class Problems:
         self._found.setdefault((place, where), Problem(place, where, what))
 
     def raise_if_any(self, questions: Iterable[str] = ()) -> None:
-        """If there are problems, raise a `CampaignError` with all problems by file and line, and then the questions."""
+        """If there are problems, raise a `CampaignError` with the problems, sorted by line, and the questions."""
         if self._found:
             sources = list(dict.fromkeys(place.source for place, _ in self._found))
             ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))
@@ -69,7 +69,7 @@ def dotted(path: Iterable[str | int]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value for a message, shortened if it is long."""
+    """Return a value as text for a message. Long texts are shortened."""
     if value is None:
         return "nothing"
     if isinstance(value, dict):

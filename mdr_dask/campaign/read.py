@@ -22,9 +22,9 @@ from mdr_dask.units import to_si
 
 
 def load(path: str | FilePath) -> Campaign:
-    """Read a campaign file. File names in the campaign are relative to the folder of this file.
+    """Read a campaign file. File names in the campaign are relative to the folder of the campaign file.
 
-    A CampaignError lists all problems by line: ``force.yaml:12:12: parameters.hurst: expected at most 1, got 1.2``.
+    Problems are raised as a CampaignError with lines such as ``force.yaml:12:12: parameters.hurst: expected ...``.
     """
     return loads(read_text(path), str(path), str(FilePath(path).parent))
 
@@ -75,7 +75,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys, with a default or a placeholder for wrong keys, and the names of the wrong keys."""
+    """Return the checked keys and the names of the wrong keys. A wrong key gets a default or a placeholder."""
     wrong: set[str] = set()
 
     def report(path: Path, what: str, key: bool) -> None:

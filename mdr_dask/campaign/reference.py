@@ -1,4 +1,4 @@
-"""Write the reference page of the campaign file: ``python -m mdr_dask.campaign.reference > docs/campaign-file.md``."""
+"""The reference page of campaign files, made by ``python -m mdr_dask.campaign.reference > docs/campaign-file.md``."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
 
 
 def alternatives_of(model: Model[Any]) -> list[str]:
-    """Return one line for each group of alternative parameters: ``length with rms_roughness, or profile``."""
+    """Return one line for each group of alternative parameters, such as ``length with rms_roughness, or profile``."""
     nested = [(f"{path}.", kind) for path, _, info in fields.walk(model.parameters) for kind in fields.structures(info)]
     return [
         describe(tuple(tuple(f"{before}{name}" for name in member) for member in group))

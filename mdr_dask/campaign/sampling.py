@@ -1,4 +1,4 @@
-"""Cases that do not form a grid: they are drawn from intervals, or read from a table."""
+"""Cases that do not form a grid, but are drawn from intervals or read from a table."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brack
 
 
 def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
-    """Return the varied parameters with one value for each point of the design, drawn from their intervals."""
+    """Return the varied parameters, each with one value from its interval for every point of the design."""
     import numpy as np
     from scipy.stats import qmc
 
@@ -45,9 +45,10 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the points of a Saltelli design from pairs of points: a in `first`, b in `second`, shape (points, inputs).
+    """Return the points of a Saltelli design. `first` and `second` have the shape (points, inputs).
 
-    Each pair gives a, b, and for every input a copy of a in which the value of this input comes from b.
+    A row a of `first` and the same row b of `second` give the points a and b. For every input, the design also
+    contains a copy of a with the value of this input in b.
     """
     import numpy as np
 
@@ -71,7 +72,8 @@ def tabled(
     """Read the varied parameters from a CSV file: each column is a parameter, and each line is a case.
 
     `origin` is the position of the file name in the campaign, and `data` contains the parameters outside the table. If
-    the table is wrong, add its problems to `problems` and return None. Add the names of ignored columns to `remarks`.
+    the table is wrong, its problems are added to `problems`, and the result is None. The names of ignored columns are
+    added to `remarks`.
     """
     path = Path(directory, name)
     try:
@@ -106,7 +108,7 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is ignored: it is not if it has numbers and its heading resembles a parameter."""
+    """Return whether a column is ignored. A column of numbers is not ignored if its heading resembles a parameter."""
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

@@ -11,7 +11,7 @@ from mdr_dask.models.base import Model, Parameters
 
 Schema = dict[str, Any]
 
-#: Name of a model that the user wrote, ``package.module:NAME``.
+#: Pattern of the name of a model that the user wrote: ``package.module:NAME``.
 _OWN_MODEL = r"^[A-Za-z_][\w.]*:[A-Za-z_][\w.]*$"
 #: Schema of a quantity with a unit: a text that begins like a number. The schema does not check the unit.
 _QUANTITY = {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)", "description": "a number with its unit"}
@@ -40,7 +40,7 @@ def json_schema() -> Schema:
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
     """Return the schema of the key ``parameters`` for a model.
 
-    `references` is the form of a reference to a nested parameter set; ``{model}`` stands for the name of the set.
+    `references` is the form of a reference to a nested parameter set. ``{model}`` stands for the name of the set.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

@@ -33,7 +33,7 @@ class ToleranceSpec(Parameters):
 
 
 class AdaptiveSpec(Parameters):
-    """Each case gets more realisations until its standard errors are small enough."""
+    """A number of realisations that grows for each case until the standard errors of the case are small enough."""
 
     at_least: Whole = Field(20, ge=2, description="number of realisations that every case gets")
     at_most: Whole = Field(description="largest number of realisations that a case may get", ge=2)

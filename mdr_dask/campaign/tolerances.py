@@ -1,4 +1,4 @@
-"""Read the tolerances of a campaign, and check that they fit its outputs."""
+"""Read the tolerances of a campaign, and check that the tolerances fit the outputs."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def tolerances(
 
 
 def is_of_fit(name: str, model: Model[Any]) -> bool:
-    """Return whether a name means a fitted constant, such as ``zone_one.alpha``, and not a misspelt output."""
+    """Return whether a name is similar to no output, and so means a fitted constant such as ``zone_one.alpha``."""
     return not similar(name, [output.name for output in model.outputs])
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
     """Return the tolerances of fitted constants, with keys of the form ``fit.constant``.
 
-    A tolerance with ``%`` is relative to the constant; a number without ``%`` is absolute.
+    A tolerance with ``%`` is relative to the constant. A number without ``%`` is absolute.
     """
     found = {}
     for name, written in given.items():
@@ -67,7 +67,7 @@ def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dic
 
 
 def tolerance(given: Written, unit: str) -> Tolerance:
-    """Return a tolerance in SI; raise ValueError if it is not a tolerance or its unit does not fit the output."""
+    """Return a tolerance in SI. Raise ValueError if the tolerance is not positive or its unit does not fit."""
     if isinstance(given, ToleranceSpec):
         absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
         found = Tolerance(given.relative, absolute)
@@ -81,7 +81,7 @@ def tolerance(given: Written, unit: str) -> Tolerance:
 def refinement(
     document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str]
 ) -> Refinement | None:
-    """Return the refinement of the adaptive axis at a path of a document; None if there is a problem."""
+    """Return the refinement of the adaptive axis at a path of a document, or None if there is a problem."""
     data = value_at(document.data, path)
 
     def report(inner: Path, what: str, key: bool = False) -> None:

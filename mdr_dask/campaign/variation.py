@@ -15,18 +15,18 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.problems import Path, Place, dotted, shown
 from mdr_dask.units import expected, to_si
 
-#: Largest number of values on one axis; a larger number is taken to be a mistake in the file.
+#: Largest number of values on one axis. A larger number is taken to be a mistake in the file.
 MOST_VALUES = 10**6
 RANGES = ("linear", "geometric", "values", "adaptive")
-#: Number of values with which an adaptive axis begins: its ends, its middle and its quarters.
+#: Number of values with which an adaptive axis begins: its ends, its middle and its quarter points.
 FIRST = 5
-#: An adaptive axis is interpolated on a logarithmic scale if the ratio of its ends exceeds this number.
+#: An adaptive axis has a logarithmic scale if its ends are positive and their ratio exceeds this number.
 DECADE = 10.0
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a value is written: its key, its position in the file, and its path (None if it is written in a table)."""
+    """The origin of a value: its key, its position in the file, and its path. Values in a table have the path None."""
 
     name: str
     place: Place
@@ -34,9 +34,9 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter: as written in the file, or in SI if it was computed from a range.
+    """One value of a varied parameter: as written in the file, or in SI if the value was computed from a range.
 
-    `inner` is true for the values of a range between the smallest and the largest.
+    `inner` is true for all values of a range except the smallest and the largest value.
     """
 
     value: Any
@@ -46,15 +46,15 @@ class Item(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The text of the value as written in the file, or its number if it was computed from a range."""
+        """The text of the value in the file, or the number as text if the value was computed from a range."""
         return self.written or f"{self.value:g}"
 
 
 @dataclass(frozen=True)
 class Variation:
-    """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
+    """A varied parameter: its path in the parameters, and its values or the interval from which values are drawn.
 
-    Only an adaptive axis has both values and an interval; `written` is its path in the document.
+    Only an adaptive axis has both values and an interval. `written` is the path of an adaptive axis in the document.
     """
 
     path: tuple[str, ...]
@@ -89,7 +89,7 @@ def find(
 
 
 class _MalformedError(Exception):
-    """Raised to stop reading a range after a problem of the range was reported."""
+    """The signal to stop reading a range, after a problem of the range was reported."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return at most `count` different values of an interval, including its exact ends."""
+    """Return at most `count` distinct values of an interval, including its exact ends."""
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
     ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
     return list(dict.fromkeys([ends[0], *inner, ends[1]]))

@@ -18,7 +18,7 @@ from mdr_dask.units import is_doubtful, likely, unit_behind
 
 @lru_cache(maxsize=16)
 def written_units(text: str) -> dict[str, str]:
-    """Return the unit of each parameter for which the campaign uses one unit only.
+    """Return the unit of each parameter whose values have the same unit everywhere in the campaign.
 
     The keys are names of coordinates, such as ``indenter_radius``. If the text cannot be read, the result is empty.
     """
@@ -42,8 +42,8 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter with a number that has no unit and is perhaps not meant in SI.
 
-    `paths` contains the path of each parameter in the document. `units` contains the units of parameters, by dotted
-    name, that differ from the units that the model declares.
+    `paths` contains the path of each parameter in the document. `units` maps the dotted name of a
+    parameter to its unit, if this unit is not the unit that the model declares.
     """
     asked: set[Path] = set()
     for name, given in data.items():
@@ -68,7 +68,7 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """For every number and text, even inside lists, yield the path of its parameter, its own path and its value."""
+    """Yield every number or text, also in lists, after the path of its parameter and its own path in the document."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if key in RANGES and isinstance(inner, list):

@@ -29,7 +29,7 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
-#: Groups of commands in ``--help``; commands that are in none of these groups are listed last.
+#: Groups of commands in ``--help``. All other commands are listed last.
 GROUPS = {
     "study": ("check", "run", "status", "verify"),
     "answers": ("show", "fit", "master-curve", "plot", "report"),
@@ -50,7 +50,7 @@ class Commands(click.Group):
             formatter.write_text(f"{', '.join(others)}; each with --help")
 
     def invoke(self, context: click.Context) -> Any:
-        """Run a command; it is not an error if a program such as ``head`` stops reading the output."""
+        """Run a command. Return 0 if a program such as ``head`` stops reading the output."""
         try:
             result = super().invoke(context)
             sys.stdout.flush()
@@ -120,7 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
         say("interrupted; finished results are kept; the same command computes the others", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages that tasks of Zarr were cancelled
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages about cancelled tasks of Zarr
         say(str(error), err=True)
         return 2
     except OSError as error:
@@ -134,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace missing standard streams; write characters that the encoding of a stream lacks as ASCII escapes."""
+    """Replace missing standard streams, and let streams write characters outside their encoding as ASCII escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # the stream was closed by a service manager, or by `>&-` in a shell
@@ -144,7 +144,7 @@ def _open_streams() -> None:
 
 
 def _discard_output() -> None:
-    """Discard the rest of the output, so that Python does not raise another error when it exits."""
+    """Discard the rest of the output, so that Python exits without another error."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

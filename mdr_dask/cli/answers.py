@@ -40,7 +40,7 @@ def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
 
 
 def write_answer(answer: Table, path: Path) -> int:
-    """Write a table to a file, in the format that the suffix of its name states; return the number of rows."""
+    """Write a table to a file in the format of the suffix of `path`, and return the number of rows."""
     rows = 0
 
     def counted() -> Iterator[pd.DataFrame]:
@@ -105,7 +105,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors (``0.1234 +- 0.0005``) or its interval (``0.1234 (0.1220, 0.1240)``).
 
-    Errors that are unknown or zero in all rows are left out. Also return a text that names the other errors.
+    Errors that are unknown or zero in all rows are left out. Also return a text that names the printed errors.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}
@@ -131,7 +131,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return a text that names the printed errors, once for all outputs or else for each output."""
+    """Return a text that names the printed errors, once for all outputs if possible, otherwise for each output."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""

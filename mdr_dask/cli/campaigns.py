@@ -59,7 +59,7 @@ def models(name: str | None, form: str | None) -> None:
 
 
 def _indented(path: str) -> str:
-    """Return the last part of a dotted name, with two spaces before it for each other part."""
+    """Return the last part of a dotted name, indented by two spaces for each of the other parts."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 
@@ -72,7 +72,7 @@ def _parameter(row: dict[str, str]) -> str:
 
 
 def _output(row: dict[str, str]) -> str:
-    """Return the meaning, unit and dimensions of an output, whether it needs a request, and whether it has an error."""
+    """Return the meaning, unit and dimensions of an output, and perhaps ``only if requested`` and ``with error``."""
     along = row["dimensions"] and f"along {row['dimensions']}"
     missing = "" if row["default"] == "yes" else "only if requested"
     return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))
@@ -83,7 +83,7 @@ def _with_unit(row: dict[str, str]) -> str:
 
 
 def _model(name: str) -> Model[Any]:
-    """Return a model; raise UsageError for an unknown name."""
+    """Return a model, or raise UsageError for an unknown name."""
     from mdr_dask import models
     from mdr_dask.campaign.read import with_hint
     from mdr_dask.errors import ModelError

@@ -27,10 +27,10 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures and writes its own command line into their tables."""
+    """A command that draws figures, and writes its command line into the tables of the figures."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
-        """Keep the command line as it was typed, then parse it."""
+        """Store the command line in `context`, then parse the arguments."""
         context.meta[COMMAND] = shlex.join(["mdr-dask", str(self.name), *arguments])
         return super().parse_args(context, arguments)
 
@@ -76,9 +76,9 @@ def plot(
     """Draw figures by name, or any output against any axis; without a name, list figures, outputs and axes.
 
     Without --over and --effects, an output is drawn against the axis with the most values. The data of every figure
-    are written to a table next to it, FIGURE.csv. If a study has more axes than a figure can show, each further axis
-    is fixed at one value, which is printed. Choose another value with --select. Several stores can be drawn in one
-    figure.
+    are written to the table FIGURE.csv next to the figure. If a study has more axes than a figure can show, each
+    further axis is fixed at one value, which is printed. Choose another value with --select. Several stores can be
+    drawn in one figure.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
@@ -135,7 +135,7 @@ def plot(
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return each different warning of the finished results once, without details."""
+    """Return each warning of the finished results once for each store, with the number of cases."""
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
@@ -149,7 +149,7 @@ def _warnings(urls: Sequence[str]) -> list[str]:
 
 
 def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the stores among the arguments of a command, and the names that follow them."""
+    """Return the stores at the beginning of the arguments of a command, and the names after the stores."""
     from mdr_dask.store import is_study
 
     def is_place(word: str) -> bool:
@@ -194,7 +194,7 @@ def _requested(
     groups: Mapping[str, xr.Dataset],
     axes: Mapping[str, Any],
 ) -> dict[str, Plot]:
-    """Return the requested figures; the keys become the names of their files."""
+    """Return the requested figures. The names of files contain the keys."""
     given = [option for option in OF_OUTPUTS if axes[option]]
     if everything:
         if names or given:
@@ -230,7 +230,7 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store by their names in legends; with several stores, each name includes the store."""
+    """Return the groups of a store by their names in legends. With several stores, each name includes the store."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -266,14 +266,14 @@ def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[st
 
 
 def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
-    """Print each note once, after the names of its figures."""
+    """Print each note once, after the names of all figures with this note."""
     for note in dict.fromkeys(chain.from_iterable(notes.values())):
         about = [name for name, own in notes.items() if note in own]
         tell(f"{'all figures' if len(about) == len(notes) > 1 else ', '.join(about)}: {note}")
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:
-    """Return the path of each figure: any path for a single figure, paths in one folder for several figures."""
+    """Return the path of each figure. Several figures are written into the same folder."""
     folder = output or Path("figures")
     if alone and folder.suffix and not folder.is_dir():
         require_suffix(folder, FIGURES)

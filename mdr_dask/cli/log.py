@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
-    """Yield the function that writes the events of a run to the file `log`, and their messages to stderr.
+    """Yield a function that writes events of a run to the file `log`, and the messages of the events to stderr.
 
-    The first line of the log contains `about`.
+    The first line that this run writes contains `about`.
     """
     lock = threading.Lock()
     if log is not None:

@@ -82,8 +82,8 @@ def master_curve(
     SOURCE is a store, a table, or a result that --keep has written. A table is a CSV file with a row of names and, if
     wanted, a row of units; - means standard input. If SOURCE is a result that --keep has written, only the reference
     can be changed. If the curves differ in both velocity and temperature, there is a shift factor for every velocity
-    and one for every temperature. The storage and loss modulus of a test are shifted together, unless --of names only
-    one of them.
+    and a shift factor for every temperature. The storage and loss modulus of a test are shifted together, unless --of
+    names only one modulus.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
@@ -176,7 +176,7 @@ def _kept(source: str) -> xr.Dataset | None:
 
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
-    """Print one part of the result. If the curves differ in two quantities, print a table of factors for each."""
+    """Print one part of the result. If the curves differ in two quantities, print two tables of factors."""
     from mdr_dask.fits.collapse import sign_of
     from mdr_dask.fits.curve_tables import is_temperature
 

@@ -14,7 +14,7 @@ from mdr_dask.cli.writing import FIGURES, require_suffix
 
 
 def tell(sentence: str) -> None:
-    """Print a message on stderr; results are printed on stdout."""
+    """Print a message on stderr, because stdout is for results."""
     say(sentence, err=True)
 
 
@@ -25,7 +25,7 @@ def _units(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> dic
 
 
 def listed(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names in texts; a text may contain several names, separated by commas."""
+    """Return the names in texts. A text may contain several names, separated by commas."""
     return tuple(name.strip().replace(".", "_") for text in texts for name in text.split(",") if name.strip())
 
 
@@ -72,7 +72,7 @@ def _figure(_: click.Context, __: click.Parameter, path: Path | None) -> Path | 
 
 
 def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options for the look of figures; the command gets these options as a dictionary `look`."""
+    """Add the options for the look of figures. The command gets these options as a dictionary `look`."""
 
     @wraps(command)
     def wrapped(*given: Any, size: str | None, title: str | None, style: str | None, **rest: Any) -> Any:

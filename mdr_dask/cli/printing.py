@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: The error of a mean counts as a rounding error if it is below this fraction of the mean.
+#: The error of a mean counts as a rounding error if the error is below this fraction of the mean.
 ROUNDING = 1e-13
 #: `GAP`: number of spaces between two columns of a table. `NARROWEST`: least width of a table, in characters.
 GAP, NARROWEST = 2, 40
@@ -39,7 +39,7 @@ def terminal_width() -> int:
 
 
 def say(text: str, err: bool = False) -> None:
-    """Print a text with control characters escaped; on a terminal, long lines are wrapped between words."""
+    """Print a text with control characters escaped. On a terminal, long lines are wrapped between words."""
     stream = sys.stderr if err else sys.stdout
     lines = printable(text).split("\n")
     if stream is not None and (stream.isatty() or "COLUMNS" in os.environ):
@@ -73,14 +73,15 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
 
 
 def titled(name: str, unit: str) -> str:
-    """Return the heading of a column: its name, and its unit if it has one."""
+    """Return the heading of a column: the name, and the unit unless the column contains pure numbers."""
     return f"{name} [{unit}]" if unit not in ("1", "") else name
 
 
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
-    """Print columns side by side: a wide table in parts that repeat the first `keys` columns, a wide row as a list.
+    """Print columns side by side. If a table is too wide, print a single row as a list, and several rows in parts.
 
-    Columns with the same value in all rows, and columns without values, are named in a line that begins with `note`.
+    Each part begins with the first `keys` columns. Columns with the same value in all rows, and columns without values,
+    are named in a line that begins with `note`.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]
@@ -119,7 +120,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
 
 
 def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
-    """Return the columns of each part of a table that is too wide; every part begins with the key columns."""
+    """Return the columns of each part of a table that is too wide. Every part begins with the key columns."""
     first, rest = list(range(keys)), list(range(keys, len(widths)))
     parts, part = [], list(first)
     for column in rest:
@@ -149,7 +150,7 @@ def _is_text(column: Sequence[str]) -> bool:
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts; if the result is wrapped, all lines of the second text begin in the same column."""
+    """Join two texts. If the result is wrapped, all lines of the second text begin in the same column."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -186,7 +187,7 @@ def _unit(title: str) -> str:
 
 
 def print_left(count: int | None) -> None:
-    """Print on stderr how many rows a limit left out (`count`, None if unknown)."""
+    """Print on stderr that a limit left out `count` rows, or an unknown number of rows if `count` is None."""
     if count != 0:
         click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 
@@ -212,7 +213,7 @@ def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
 
 
 def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
-    """Join each constant and the ends of its interval into one column: ``0.123 (0.120, 0.126)``."""
+    """Join each constant and the ends of its interval into one column, as in ``0.123 (0.120, 0.126)``."""
     known = {name for name in units if f"{name}_low" in units and f"{name}_high" in units}
     ends = {f"{name}_{end}" for name in known for end in ("low", "high")}
     kept = [name for name in units if name not in ends]
@@ -227,7 +228,7 @@ def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], d
 
 
 def with_interval(value: float, low: float = math.nan, high: float = math.nan) -> str:
-    """Return a constant as text, followed by the ends of its interval if they are known."""
+    """Return a constant as text, followed by the ends of its interval if both ends are known."""
     if math.isnan(value):
         return "not determined"
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -236,7 +237,7 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors; an unknown error becomes ``?``, and a rounding error becomes 0."""
+    """Join a mean and its errors. An unknown error becomes ``?``, and a rounding error becomes 0."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
     shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]
@@ -248,7 +249,7 @@ def _error(error: float, size: float) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Return a number with `digits` digits, and with a power of ten if it is very small or very large."""
+    """Return a number with `digits` digits, and with a power of ten if the number is very small or very large."""
     text = f"{value:.{digits}g}"
     if "e" in text and _SMALL <= abs(float(text)) < _LARGE:
         return f"{float(text):.0f}"
@@ -256,7 +257,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def short(value: Any) -> str:
-    """Return a value as the text of a cell, ``-`` if it is unknown."""
+    """Return the text of a cell with the given value, or ``-`` for an unknown value."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return UNKNOWN
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")

@@ -1,4 +1,4 @@
-"""Write the command reference: ``python -m mdr_dask.cli.reference > docs/commands.md``."""
+"""The command reference, made by ``python -m mdr_dask.cli.reference > docs/commands.md``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def commands_page() -> str:
 
 
 def _text(help_text: str) -> list[str]:
-    """Turn a help text into Markdown; paragraphs that click does not wrap become blocks of code."""
+    """Turn a help text into Markdown. Paragraphs that click does not wrap become blocks of code."""
     lines: list[str] = []
     for paragraph in help_text.split("\n\n"):
         kept = paragraph.strip().startswith("\b")

@@ -23,7 +23,7 @@ class Reading(click.Command):
     """A command whose first argument is a store."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command; raise an error of one sentence if a chunk of the store cannot be read."""
+        """Run the command. If a chunk of the store cannot be read, raise an error of one sentence."""
         from mdr_dask.store import readable
 
         with readable(context.params[str(self.params[0].name)]):

@@ -51,9 +51,9 @@ if TYPE_CHECKING:
 def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str | None, **options: Any) -> int:
     """Run a campaign: compute all results that the store does not contain yet.
 
-    After an interruption, give the same command again: finished results are kept, and only the others are computed.
-    Exit code 0: all results are done; 1: some results have failed, in this run or in an earlier one; 2: the run was
-    refused or could not go on.
+    After an interruption, give the same command again: finished results are kept, and only missing results are
+    computed. Exit code 0: all results are done; 1: some results have failed, in this run or in an earlier run; 2: the
+    run was refused or could not go on.
 
     \b
     mdr-dask run campaigns/quickstart.yaml
@@ -183,6 +183,6 @@ def _print_failed(url: str, progress: Progress) -> None:
 
 
 def _shared(progress: Progress) -> str:
-    """Return a text with the fraction of results that share the solution of another result; empty if none does."""
+    """Return a text with the fraction of results that needed no solution of their own, or an empty text."""
     share = 1 - progress.solves / max(progress.done, 1)
     return f" ({share:.1%} of the results needed no solve of their own)" if progress.solves and share > 0 else ""

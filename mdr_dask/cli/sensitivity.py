@@ -39,7 +39,7 @@ def sensitivity(
     """Compute which parameters matter for an output: Sobol indices of a sampled study, with 95 % intervals.
 
     The first-order index of a parameter is the fraction of the variance that this parameter explains alone. The total
-    index includes its interactions with other parameters. Total indices need a campaign with
+    index includes the interactions of the parameter with other parameters. Total indices need a campaign with
     `sampling: {saltelli: n}`; first-order indices can be computed for every sampled study.
 
     \b

@@ -56,7 +56,7 @@ def surface(
     FILES are maps, scans, or tables of a spectrum, all of the same surface. Sq and Sa (maps) and Pq (scans) are
     computed from the levelled heights. Gradient, slopes and Hurst exponent are computed from the windowed spectrum. All
     intervals are 95 % confidence intervals. Rolloff is the longest and cutoff is the shortest wavelength of the fitted
-    power law. Each of them is empty if the power law continues to the end of the data.
+    power law. Rolloff or cutoff is empty if the power law continues to the end of the data.
 
     \b
     mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o c2d.csv

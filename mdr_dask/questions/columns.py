@@ -20,7 +20,7 @@ from mdr_dask.questions.expression import ALTERNATIVES, Find, Value, evaluate, p
 
 #: Names of two columns: the state of a row, and the number of results in this row that are done.
 STATUS, REALISATIONS = "status", "realisations"
-#: Name of the variable with the number of results in each state, which only averages over cases have.
+#: Name of the variable with the number of results in each state. Only averages over cases have this variable.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -28,7 +28,7 @@ WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of a model by name, or nothing if the model cannot be loaded."""
+    """Return the dimensionless numbers of a study's model by name, or ``{}`` if the model cannot be loaded."""
     try:
         return {number.name: number for number in models.load(str(dataset.attrs.get("model"))).numbers}
     except ModelError:
@@ -47,7 +47,7 @@ def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
 def inner(dataset: xr.Dataset, name: str) -> xr.DataArray | None:
     """Return a parameter inside the values of an axis, such as ``indenter_radius`` along an axis of indenters.
 
-    Return NaN (``-`` for words) at values of the axis without this parameter, and None if no axis has the parameter.
+    Return NaN, or ``-`` for words, where a value of the axis lacks the parameter. Return None if every axis lacks it.
     """
     for axis in dataset.attrs.get("axes", []):
         for path, entries in entries_of(axis).items() if axis["name"] in dataset.coords else ():
@@ -76,7 +76,7 @@ def _parameters(text: str) -> dict[str, object]:
 
 
 class Columns:
-    """The columns of a part of a study; each column is computed once."""
+    """The columns of a part of a study. Each column is computed once."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self.dataset = dataset
@@ -90,21 +90,21 @@ class Columns:
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit, or None; outputs are averaged over the realisations."""
+        """Return a column with its unit, or None if there is none. Outputs are averaged over the realisations."""
         if name not in self._found:
             self._found[name] = None  # prevents an infinite recursion if a formula refers to itself
             self._found[name] = self._make(name)
         return self._found[name]
 
     def column(self, name: str) -> xr.DataArray:
-        """Return a column with its unit; raise DataError if it is unknown or cannot be computed from this study."""
+        """Return a column with its unit. Raise DataError if the column is unknown or cannot be computed."""
         found = self.find(name)
         if found is None:
             raise self.unknown(name)
         return found
 
     def unknown(self, name: str) -> DataError:
-        """Return the error for an unknown name, or for a dimensionless number that this study does not determine."""
+        """Return the error for an unknown name, or for a dimensionless number that cannot be computed."""
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
@@ -119,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for a condition, in which a row is ``failed`` if any of its results failed."""
+        """Return a column for a condition. In `status`, a row equals ``failed`` if any result of the row failed."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found
@@ -168,7 +168,7 @@ class Columns:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the names of outputs that columns need; a dimensionless number needs the outputs in its formula."""
+    """Return the names of outputs that columns need. A dimensionless number needs the outputs in its formula."""
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:
@@ -179,7 +179,7 @@ def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
 
 
 def counts(dataset: xr.Dataset) -> xr.DataArray:
-    """For every row, return how many of its results are done, failed, missing, ... along the dimension ``state``."""
+    """Return the number of results of every row in each state, such as failed, along the dimension ``state``."""
     if COUNTS in dataset:
         return dataset[COUNTS]
     status = dataset[STATUS]
@@ -188,7 +188,7 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several."""
+    """Return the state of every row as text, such as ``failed`` or, for several results, ``2 failed, 1 missing``."""
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:
         status = dataset[STATUS]
         return status.copy(data=WORDS[status.to_numpy()]).drop_attrs()

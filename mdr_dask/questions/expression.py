@@ -1,6 +1,7 @@
-"""Conditions and formulas as a user types them: ``velocity > 3 km/h and contact_fraction < 50 %``.
+"""Conditions and formulas that a user types, such as ``velocity > 3 km/h and contact_fraction < 50 %``.
 
-Python's own parser converts the text to a syntax tree, whose nodes are evaluated with numpy. No text is executed.
+Python's own parser converts the text to a syntax tree. The nodes of the tree are evaluated with numpy. No text is
+executed.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Relative difference of equal numbers in conditions and selections; users copy numbers from tables with six digits.
+#: Numbers in conditions and selections count as equal up to this relative difference. Tables show six digits.
 SAME = 1e-5
-#: Dimension of a column with several words in each row; a row equals a word if the word is among them.
+#: Dimension of a column with several words in each row. A row equals each of its words.
 ALTERNATIVES = "alternatives"
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -53,8 +54,8 @@ Find = Callable[[str], xr.DataArray | None]
 class Value(NamedTuple):
     """The value of an expression: numbers in SI, words, or truth values.
 
-    `dimension` is the physical dimension of the numbers in pint, such as length; it is None for words, truth values and
-    numbers without a unit. A number without a unit, compared with a quantity or added to it, is in SI.
+    `dimension` is the physical dimension of the numbers in pint, such as length, or None for words, truth values and
+    numbers without a unit. A number without a unit is in SI if it is compared with a quantity or added to a quantity.
     """
 
     array: Any
@@ -68,7 +69,7 @@ class Value(NamedTuple):
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed text: its syntax tree, with names such as ``_quantity_0`` for numbers with units, and their values."""
+    """A parsed text. In the syntax tree, a name such as ``_quantity_0`` stands for a number with a unit."""
 
     text: str
     tree: ast.expr
@@ -95,7 +96,7 @@ def parse(text: str) -> Expression:
 
 
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
-    """Return the value of an expression; raise DataError for an unknown name or for quantities that do not match.
+    """Return the value of an expression. Raise DataError for an unknown name or for quantities that do not match.
 
     `find` returns a column with its unit in ``attrs["units"]``, or None if there is no column of this name.
     """
@@ -104,7 +105,7 @@ def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> V
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Replace numbers with units by names, because Python cannot parse units; also return the values of the names."""
+    """Replace numbers with units by names, because Python cannot parse units. Also return the values of the names."""
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):
@@ -218,7 +219,7 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Compare numbers within `SAME`, or compare words; a name that is not a column is a word."""
+        """Return where numbers agree within `SAME`, or where words are equal. A name that is not a column is a word."""
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

@@ -24,13 +24,13 @@ CASES = "cases"
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
     """Average every output over the cases of each group, separately for each realisation.
 
-    A group has C cases; case c has n_c results x_cr with the mean m_c. All cases use the same R realisations, so the
-    results of different cases are correlated. Therefore the result of the group in realisation r is ``m + R u_r``:
-    m is the mean of all m_c, and ``u_r`` the sum over c of ``(x_cr - m_c) / (n_c C)``. The mean and the standard error
-    of the R results of a group are correct even if n_c differs between cases.
+    A group has C cases. Case c has n_c results x_cr, and m_c is the mean of these results. All cases use the same R
+    realisations, so the results of the cases are correlated. Therefore the result of the group in realisation r is
+    ``m + R u_r``. Here, m is the mean of all m_c, and u_r is the sum of ``(x_cr - m_c) / (n_c C)`` over c. The mean and
+    the standard error of the R results of a group are correct even if n_c is not the same for all cases.
 
-    `by` are names of axes, or of columns of a sampled study. If `kept` is given, only the cases where it is true are
-    included. The groups are along the dimension ``group``.
+    `by` contains names of axes, or of columns of a sampled study. If `kept` is given, only cases where `kept` is true
+    are included. The groups are along the dimension ``group``.
     """
     import xarray as xr
 
@@ -64,7 +64,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """The indices of the cases, sorted by group (`order`); group k begins at ``order[starts[k]]``."""
+    """The indices of the cases, sorted by group. The first case of group k is ``order[starts[k]]``."""
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]
@@ -110,7 +110,7 @@ def _common(values: FloatArray, members: _Members) -> FloatArray:
 
 
 def _errors(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the mean grid error of every group, the same for all its realisations."""
+    """Return the mean grid error of every group. All realisations of a group have the same error."""
     each = _common(np.abs(values), members)
     there = np.isfinite(each)
     with np.errstate(invalid="ignore"):

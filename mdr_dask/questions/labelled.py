@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mdr_dask.questions.table import Question
 
 
-#: Largest size in bytes of a piece of an array; the pieces are computed in parallel.
+#: Largest size in bytes of a piece of an array. The pieces are computed in parallel.
 PIECE = 2**20
 
 

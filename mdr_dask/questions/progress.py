@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Group(NamedTuple):
     """Messages of one series that differ only in their numbers.
 
-    `kind` is the state of the results, such as ``failed``, or ``warning`` if they are done. `cases` is a text with the
+    `kind` is the state of the results, or ``warning`` if the results are done. `cases` is a text with the
     range of each varied parameter over the results.
     """
 
@@ -32,7 +32,7 @@ class Group(NamedTuple):
 
 
 def counts(url: str) -> list[dict[str, Any]]:
-    """For each series, return its name, the number of its results, and the number of results in each state."""
+    """Return, for each series, the name, the number of results, and the number of results in each state."""
     found = []
     for name in store.series_names(url):
         status = store.ledger(url, name)
@@ -42,7 +42,7 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the last message about each result of a series, unless the result has another state now."""
+    """Return the last message about each result of a series. Messages about a previous state are left out."""
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
@@ -55,9 +55,9 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 
 
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
-    """Group messages that differ only in their numbers; each warning of a result is a separate message.
+    """Group messages that differ only in their numbers. Each warning of a result is a separate message.
 
-    Quantities are converted to the units of the campaign file, which is in the attributes of the series `studies`.
+    Quantities are converted to the units of the campaign file, whose text is an attribute of each dataset.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -79,7 +79,7 @@ def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) 
 
 
 def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Return the number of cases with each warning, without the details after the colon of a warning."""
+    """Return the number of cases with each warning. Warnings are cut at the colon before the details."""
     groups: dict[str, dict[tuple[Any, ...], str]] = {}
     for message in (each for each in found if each["status"] == "done"):
         for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
@@ -94,7 +94,7 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return, for each SI unit, the only unit of the campaign file for this quantity; for K, degC is the default."""
+    """Return, for each SI unit, the unit of the campaign file if there is only one, and degC for K if there is none."""
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():
@@ -123,7 +123,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def _merged(texts: Sequence[str]) -> str:
-    """Merge texts that differ only in their numbers: ``a film ratio of 0.2 to 0.4``."""
+    """Return one text, such as ``a film ratio of 0.2 to 0.4``, for texts that differ only in their numbers."""
     columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
 
     def ends(_: re.Match[str]) -> str:

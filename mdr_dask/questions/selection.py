@@ -26,12 +26,12 @@ Tell = Callable[[str], object]
 
 
 def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings.warn) -> xr.Dataset:
-    """Keep a part of a group of a study; no dimension is removed.
+    """Keep the selected part of a group of a study. No dimension is removed.
 
-    A selection is a name, ``=``, and values or ranges that are separated by commas: ``velocity=1 mm/s..1 m/s``,
-    ``hurst=0.3,0.7``, ``radius=..2``. The name is an axis, a column of a sampled study, ``case``, ``realisation`` or a
-    fixed parameter. Both ends of a range are included. If a number is not a value of the axis, the nearest value is
-    selected, and `tell` receives a message.
+    A selection is a name, ``=``, and values or ranges that are separated by commas, as in ``velocity=1 mm/s..1 m/s``,
+    ``hurst=0.3,0.7`` or ``radius=..2``. The name is ``case``, ``realisation``, or the name of an axis, of a column of a
+    sampled study or of a fixed parameter. Both ends of a range are included. If a number is not a value of the axis,
+    the nearest value is selected, and `tell` receives a message.
     """
     units = written_units(str(dataset.attrs.get("campaign", "")))
     for text in selections:
@@ -46,7 +46,7 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply each selection to every series in which its parameter varies, or else to the first series, to check it."""
+    """Apply each selection to every series in which its parameter varies, or to the first series if there is none."""
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -57,7 +57,7 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases whose means over realisations meet a condition; mark all other cases as not needed."""
+    """Keep the cases whose means over realisations meet a condition. Mark all other cases as not needed."""
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -65,7 +65,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
 
 
 def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.Dataset]:
-    """Keep the cases of all groups that meet a condition; raise DataError if no case meets the condition."""
+    """Keep the cases of all groups that meet a condition. Raise DataError if no case meets the condition."""
     kept = {name: where(dataset, condition) for name, dataset in groups.items()}
     if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
         raise DataError(f"--where {condition}: no result meets the condition")
@@ -85,7 +85,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
-    """Keep the named outputs and their errors; by default all outputs that have one number for each result."""
+    """Keep the named outputs, or without names all outputs with one number for each result, and their errors."""
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:
@@ -142,7 +142,7 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _chosen(axis: xr.DataArray, name: str, wanted: str, own: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return a mask of the values of an axis that a selection keeps; `own` is the unit for messages."""
+    """Return a mask of the values of an axis that a selection keeps. `own` is the unit for messages."""
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
@@ -190,7 +190,7 @@ def _words(text: str) -> list[str]:
 def _nearest(
     values: NDArray[Any], wanted: float, name: str, text: Callable[[float], str], tell: Tell
 ) -> NDArray[np.bool_]:
-    """Return a mask of the value nearest to a number; select no value for a number outside the axis."""
+    """Return a mask of the value nearest to a number. For a number outside the axis, no value is selected."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -202,7 +202,7 @@ def _nearest(
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the two ends of every range in a selection, twice the same number for a single value."""
+    """Yield the two ends of every range in a selection. For a single value, the two ends are equal."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]
@@ -232,7 +232,7 @@ def _number(text: str, name: str, unit: str) -> float:
 
 
 def _extent(values: NDArray[Any], text: Callable[[float], str]) -> str:
-    """Describe the values of an axis, for error messages."""
+    """Return a text about the values of an axis, for error messages."""
     if values.size == 1:
         return f"its only value is {text(values[0])}"
     if values.size <= 6:

@@ -61,7 +61,7 @@ class Question:
 class Table:
     """A table as a sequence of data frames. The first `keys` columns identify a row.
 
-    `total` is the number of rows, or None if it is known only after the last frame.
+    `total` is the number of rows, or None if the number is known only after the last frame.
     """
 
     frames: Iterator[pd.DataFrame]
@@ -71,10 +71,10 @@ class Table:
 
 
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
-    """Answer a question about a group of a study; raise DataError for unknown names.
+    """Answer a question about a group of a study. Raise DataError for unknown names.
 
     The rows of a data frame are computed when the caller reads this frame. `limit` is the number of rows that the
-    caller will read, or 0 for all.
+    caller will read, or 0 for all rows.
     """
     maker = _Maker(dataset, question, tell)
     units = maker.units()
@@ -146,7 +146,7 @@ class _Maker:
             yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
-        """Yield, for each box, the rows that meet the condition, and the positions of these rows among all rows."""
+        """Yield, for each box, the rows that meet the condition, after the positions of these rows among all rows."""
         if whole and data.nbytes <= WHOLE:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
@@ -227,7 +227,7 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes of at most `most` points, in C order; large boxes end at the ends of chunks."""
+    """Yield the boxes of at most `most` points that make up a grid, in C order. Large boxes end where chunks end."""
     dims, inner = list(sizes), 1
     cut = len(dims)
     while cut and inner * sizes[dims[cut - 1]] <= most:

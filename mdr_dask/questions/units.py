@@ -1,4 +1,4 @@
-"""Convert columns to other units: ``velocity=km/h,wear_volume=um^3``."""
+"""Convert columns to other units, from texts such as ``velocity=km/h,wear_volume=um^3``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units by column from texts such as ``velocity=km/h,temperature=degC``."""
+    """Return the unit of each column from texts such as ``velocity=km/h,temperature=degC``."""
     wanted = {}
     for part in (part for text in texts for part in text.split(",")):
         name, equals, unit = (piece.strip() for piece in part.partition("="))
