@@ -25,22 +25,22 @@ def jit(function: Kernel) -> Kernel:
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that must not create arrays; reading arrays from named tuples is then several times faster."""
+    """Compile a function that must not create arrays. Arrays in named tuples are read several times faster."""
     return _cached(function, UNCOUNTED)
 
 
 def jit_inline(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls it."""
+    """Compile a function into each kernel that calls the function."""
     return cast(Kernel, numba.njit(forceinline=True, **OPTIONS)(function))
 
 
 def jit_inline_fused(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls it; ``a * b + c`` is rounded only once."""
+    """Compile a function into each kernel that calls the function, and round ``a * b + c`` only once."""
     return cast(Kernel, numba.njit(forceinline=True, fastmath={"contract"}, **OPTIONS)(function))
 
 
 def jit_inline_uncounted(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls it; as for `jit_uncounted`, it must not create arrays."""
+    """Compile a function that must not create arrays (see `jit_uncounted`) into each kernel that calls the function."""
     return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))
 
 
@@ -57,13 +57,13 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Turn errors of numba's cache into warnings; kernels that cannot be read are compiled again."""
+    """Turn errors of numba's cache into warnings. Kernels that cannot be read from the cache are compiled again."""
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:
         try:
             return load(signature, context)
-        except Exception as fault:  # an incomplete pickle can raise almost any exception
+        except Exception as fault:  # reading an incomplete pickle can raise almost any exception
             _warn_once(f"numba's cache of compiled kernels cannot be read ({type(fault).__name__})")
             return None
 
@@ -84,7 +84,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the last index in [low, high) with values[index] <= x, by default `low`; `values` must be ascending."""
+    """Return the last index in [low, high) where the ascending array `values` is <= x, or `low` if there is none."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

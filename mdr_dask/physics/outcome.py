@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended. Compiled functions return the number of the outcome, for example 0 for CONVERGED."""
+    """Outcome of a solver. Compiled functions return the integer value of the outcome, for example 0 for CONVERGED."""
 
     CONVERGED = 0
     DEPTH_NOT_FOUND = 1
@@ -25,7 +25,7 @@ class Outcome(IntEnum):
 
     @property
     def is_impossible(self) -> bool:
-        """Whether the case failed because of its parameters, so that a finer grid cannot help."""
+        """Whether the parameters of the case are the cause of the failure. A finer grid cannot help then."""
         return self in (Outcome.OUTSIDE_LINE, Outcome.INVALID)
 
 

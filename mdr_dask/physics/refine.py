@@ -1,16 +1,16 @@
-"""Grid refinement: solve on a grid and on the next finer grid; the difference gives an estimate of the error.
+"""Grid refinement, in which the difference between the results on two grids gives an estimate of the error.
 
-The number of cells doubles from one level to the next, so that the error of a solver of order p is divided by r = 2^p
-at each level. Take three successive levels. Let b be the relative change of a result from the first level to the
-second, and c the relative change from the second level to the third. The relative error on the third level is estimated
-as
+The number of cells doubles from one level to the next. If a solver has the order of convergence p, the error is divided
+by r = 2^p at each level. Take three successive levels. Let b be the relative change of a result from the first level to
+the second, and c the relative change from the second level to the third. The relative error on the third level is
+estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
-In the maximum, c / (r - 1) is Richardson's estimate; b / (r (r - 1)) is needed because the results on two grids may
-agree by chance: after the change b, the next change should be b / r. The safety factor is that of the grid convergence
-index (Roache, J. Fluids Eng. 116, 405, 1994). The last term e (`Solution.unseen`) covers errors that may be equal on
-two grids and then do not show in the difference of the results.
+The first expression, c / (r - 1), is Richardson's estimate. The second expression is needed because the results on the
+last two levels may agree by chance. After the change b, the next change should be b / r. The safety factor is taken
+from the grid convergence index (Roache, J. Fluids Eng. 116, 405, 1994). The last term, e (`Solution.unseen`), stands
+for errors that may be equal on two grids. Equal errors do not appear in the difference between the results.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ SAFETY = 3.0
 
 
 class Estimate(NamedTuple):
-    """A computed value or array, and its estimated absolute error of the same shape."""
+    """Computed values, and the estimated absolute error of each value."""
 
     value: FloatArray
     error: FloatArray
 
     def scaled(self, factor: float) -> Estimate:
-        """Return the value and its error, both multiplied by a factor, for example to change the unit."""
+        """Return the estimate with value and error multiplied by a factor, for example to change the unit."""
         return Estimate(self.value * factor, self.error * factor)
 
 
@@ -43,8 +43,9 @@ class Solution(NamedTuple):
     """Results of some cases on one grid.
 
     `values` contains one array per output, with one number or one profile per case. NaN in a profile marks positions
-    where the output does not exist. `outcome` contains values of `Outcome`. `unseen`, a number or an array of shape
-    (outputs, cases), is a relative error that the difference between two grids may not show.
+    where the output does not exist. `outcome` contains one value of `Outcome` per case. `unseen`, a number or an array
+    of shape (outputs, cases), is a relative error that may be missing in the difference between the results on two
+    grids.
     """
 
     values: Sequence[FloatArray] | FloatArray
@@ -53,11 +54,12 @@ class Solution(NamedTuple):
 
 
 class Refined(NamedTuple):
-    """Results of all cases, each on the coarsest grid that meets the accuracy.
+    """Results of `refine` for all cases.
 
-    `values` is NaN where a case has no solution. `errors`, shape (outputs, cases), are absolute, and infinite where no
-    estimate is possible; the error of a profile is the largest error along it. `met` is True if every output of a case
-    meets the accuracy. `level` is the level of the grid on which the result was computed.
+    `values` is NaN for cases without a solution. `errors`, shape (outputs, cases), contains absolute errors, or
+    infinity if no estimate is possible. The error of a profile is the largest error along the profile. `met` is True
+    for a case if every requested output meets the accuracy. `level` is the level of the grid on which the case was
+    solved.
     """
 
     values: list[FloatArray]
@@ -82,17 +84,18 @@ def refine(
     """Solve every case on the coarsest grid on which all requested outputs meet `accuracy`.
 
     The function `solve(level, cases)` solves the cases with the given indices on the grid of a level, and must not
-    raise an exception for a case that fails. Every case is solved on at least two levels, unless it fails because of
-    its parameters. If a case fails on fine grids only, its last solution is returned.
+    raise an exception for a case that fails. Every case is solved on at least two levels, unless the parameters of the
+    case are the cause of a failure. If a case fails on fine grids only, the solution on the finest grid without a
+    failure is returned.
 
-    The accuracy of an output is relative to the largest absolute value of the output, or to its entry in `floors` if
-    that is larger. If `accuracy` is infinite, the second level is accepted. `order` is the order of convergence of the
-    dominant part of the error. Only the first `requested` outputs must meet the accuracy, or all outputs if `requested`
-    is None. Outputs that are not requested have infinite errors.
+    The accuracy of an output is relative to the largest absolute value of the output, or to the entry of the output in
+    `floors` if this entry is larger. If `accuracy` is infinite, the result on the second level is accepted. `order` is
+    the order of convergence of the dominant part of the error. Only the first `requested` outputs must meet the
+    accuracy, or all outputs if `requested` is None. Outputs that are not requested have infinite errors.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all outputs of
-    this case, because one output alone may be the same on two grids by chance. Choose `shared` = False for outputs
-    that converge at different rates.
+    this case, because a single output may have the same value on two grids by chance. Choose `shared` = False for
+    outputs that converge at different rates.
     """
     reduction = 2.0**order
     left = np.arange(cases)
@@ -111,7 +114,7 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change[:requested].max(axis=0, initial=0.0), change.shape)
-        # `before` is infinite if a case had no solution on an earlier grid; the second term of the maximum is then 0
+        # if a case had no solution on an earlier grid, `before` is infinite, and the second expression is set to 0
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
         solved = fine.outcome == Outcome.CONVERGED
@@ -134,8 +137,8 @@ def refine(
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
-    The largest change of a profile is divided by the largest absolute value of the profile. The change is infinite if a
-    case has no solution on one of the grids.
+    The largest change along a profile is divided by the largest absolute value of the profile, or by the floor of the
+    output if the floor is larger. The change is infinite if a case has no solution on either grid or on both grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))
@@ -149,12 +152,12 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return the largest absolute value of each output in each case, or the output's floor if that is larger."""
+    """Return the largest absolute value of each output in each case, or the output's floor if this floor is larger."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 
 def _largest(sizes: FloatArray) -> FloatArray:
-    """Return the largest entry of `sizes` for each case; no entry may be negative."""
+    """Return the largest entry of `sizes` for each case. No entry may be negative."""
     return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 

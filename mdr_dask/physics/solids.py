@@ -1,7 +1,7 @@
 """Linear viscoelastic solids: moduli, Prony series fitted to data, and shifts to other temperatures.
 
-The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``, where a_m is the strain of the
-dashpot of Prony term m, with ``da_m/dt = (u - a_m) / tau_m``.
+The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``. The strain a_m of the dashpot in
+Prony term m follows from ``da_m/dt = (u - a_m) / tau_m``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class LinearSolid:
     """A linear viscoelastic solid: a spring, Prony terms and a dashpot in parallel.
 
     Moduli are shear moduli in Pa. `times` contains the relaxation times of the Prony terms in s, ascending and
-    distinct. `viscosity` is the viscosity of the dashpot in Pa s.
+    distinct. `viscosity` is the viscosity in Pa s of the dashpot that is parallel to the Prony terms.
     """
 
     static_modulus: float
@@ -40,7 +40,7 @@ def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
 
 
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the standard solid, which has one Prony term; moduli in Pa, time in s.
+    """Return the standard solid, which has one Prony term. Moduli are in Pa, and the time is in s.
 
     `static_modulus` is the modulus for very slow deformation, and `glass_modulus` the modulus for sudden deformation.
     """
@@ -50,18 +50,19 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
 
 
 def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity: float = 0.0) -> LinearSolid:
-    """Return a solid with Prony terms, sorted by relaxation time.
+    """Return a solid whose Prony terms are sorted by relaxation time.
 
     Terms with equal relaxation times are merged. Terms with the modulus 0 are left out.
 
     Parameters
     ----------
     static_modulus : float
-        G_inf > 0, Pa. Without a static modulus, a periodic contact would carry no load in the steady state.
+        Static modulus G_inf > 0 in Pa. Without a static modulus, a periodic contact would carry no load in the steady
+        state.
     moduli, times : array_like, shape (terms,)
-        G_m >= 0, Pa, and tau_m > 0, s.
+        Moduli G_m >= 0 in Pa, and relaxation times tau_m > 0 in s.
     viscosity : float
-        eta >= 0 of a dashpot in parallel, Pa s.
+        Viscosity eta >= 0 in Pa s of a dashpot in parallel.
 
     Raises
     ------
@@ -93,7 +94,7 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
 
 
 def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray[np.complex128]:
-    """Return G*(omega) = G' + i G'', Pa, at angular frequencies in rad/s."""
+    """Return G*(omega) = G' + i G'' in Pa at angular frequencies omega in rad/s."""
     omega = np.asarray(angular_frequency, dtype=np.float64)
     product = omega[..., None] * solid.times
     terms = solid.moduli * product / (product - 1j)
@@ -114,12 +115,12 @@ def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
 
 @dataclass(frozen=True)
 class SeriesFit:
-    """A Prony series fitted to moduli, and its errors.
+    """A Prony series fitted to moduli, and the errors of the fit.
 
-    `storage_error` is the root mean square of the relative errors of G', and `loss_error` that of G''; an error is NaN
-    if there are no data for its modulus. `largest_error` is the largest relative error of G' or G''; it occurs at the
-    angular frequency `worst_frequency` in rad/s. `range` contains the lowest and the highest angular frequency of the
-    data.
+    `storage_error` and `loss_error` are the root mean squares of the relative errors of G' and of G''. `storage_error`
+    is NaN if the series was fitted to G'' alone. `largest_error` is the largest relative error of G' or G'', and occurs
+    at the angular frequency `worst_frequency` in rad/s. `range` contains the lowest and the highest angular frequency
+    of the data.
     """
 
     solid: LinearSolid
@@ -131,7 +132,7 @@ class SeriesFit:
 
     @property
     def error(self) -> float:
-        """Root mean square of `storage_error` and `loss_error`; an error that is NaN is left out."""
+        """Root mean square of `storage_error` and `loss_error`, or `loss_error` alone if `storage_error` is NaN."""
         return _rms(np.array([error for error in (self.storage_error, self.loss_error) if np.isfinite(error)]))
 
 
@@ -146,8 +147,8 @@ def power_law_series(
     """Return a Prony series for the law G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45).
 
     `loss_modulus` is G'' in Pa at the angular frequency `frequency` in rad/s. The series follows the law at angular
-    frequencies from `lowest` to `highest`; its relaxation times extend one decade beyond this range. With two terms per
-    decade, the error of G'' in the range is below 1 %.
+    frequencies from `lowest` to `highest`. The reciprocals of the relaxation times extend one decade beyond both ends
+    of this range. With two terms per decade, the error of G'' in the range is below 1 %.
     """
     if not 0 < exponent < 1:
         raise ValueError(f"the exponent of a power-law spectrum must lie between 0 and 1, got {exponent!r}")
@@ -176,9 +177,9 @@ def fit_series(
     Parameters
     ----------
     angular_frequency : array_like, shape (points,)
-        omega, rad/s, over at least one decade, in any order.
+        Angular frequencies omega in rad/s, over at least one decade, in any order.
     storage, loss : array_like, shape (points,)
-        G' and G'', Pa, positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
+        G' and G'' in Pa, all positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
     terms_per_decade : float
         Number of relaxation times per decade. The relaxation times extend from half a decade below the smallest 1 /
         omega to half a decade above the largest 1 / omega.
@@ -188,8 +189,8 @@ def fit_series(
     Raises
     ------
     ValueError
-        If the three lists differ in length, have fewer than two values, or contain a value that is not positive and
-        finite; or if the fitted static modulus is zero.
+        If frequencies and moduli differ in length, have fewer than two values, or contain a value that is not positive
+        and finite, or if the fitted static modulus is zero.
     """
     omega, stored, lost = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (angular_frequency, storage, loss))
     if not omega.size == stored.size == lost.size >= 2:
@@ -247,13 +248,13 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
     Parameters
     ----------
     temperature : array_like
-        T, K.
+        Temperatures T in K.
     reference : float
-        T_ref, K.
+        Reference temperature T_ref in K.
     c1 : float
         Dimensionless constant.
     c2 : float
-        Constant, K; the law is valid for T > T_ref - c2 only.
+        Constant in K. The law is valid for T > T_ref - c2 only.
 
     Raises
     ------
@@ -276,7 +277,7 @@ def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy
 
 
 def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
-    """Multiply all relaxation times, and the viscosity of the dashpot, by a_T; return the new solid."""
+    """Return the solid with all relaxation times and the viscosity multiplied by the shift factor a_T (`factor`)."""
     return replace(solid, times=solid.times * factor, viscosity=solid.viscosity * factor)
 
 
@@ -295,9 +296,9 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the decay times lambda_k of free recovery, which are the zeros of 1 + sum weight_m / (tau_m - lambda).
 
-    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. With
-    ascending, distinct times tau_m, lambda_k lies between tau_k and tau_(k+1), and the largest lambda_k lies above the
-    largest tau_m. The second result contains tau_m - lambda_k in row m and column k.
+    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. The times
+    tau_m must be ascending and distinct. Each lambda_k lies between tau_k and tau_(k+1), except the largest lambda_k,
+    which lies above the largest tau_m. The second result contains tau_m - lambda_k in row m and column k.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -309,7 +310,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
         offset = sign * _distance_to_zero(pole, sign, gap, weight, times)
         zeros[k] = times[pole] + offset
         for m in range(terms):
-            # the difference is precise even if the times cover many decades
+            # this form of tau_m - lambda_k is precise even if the times cover many decades
             distance[m, k] = (times[m] - times[pole]) - offset
     return zeros, distance
 

@@ -1,9 +1,9 @@
-"""Where the asperities of two rough lines, separated by a film, break the boundary layer (thesis section 5.2.2).
+"""Breaks of the boundary layer by asperities of two rough lines that are separated by a film (thesis section 5.2.2).
 
-A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``; D is the length of
-the interval. The cluster breaks the layer if ``int (z - h0) dx > s D^3`` with the layer strength
-``s = pi tau0/(12 E* h_c)`` (eqs. 5.5, 5.6). The contact zone is a window that begins at each node in turn.
-The lines are closed cubic splines: the first node follows the last, and all integrals are exact.
+A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``. The cluster breaks
+the layer if ``int (z - h0) dx > s D^3``, with the length D of the interval and the result s of `layer_strength` (eqs.
+5.5, 5.6). The contact zone is a window that begins at each node in turn. The lines are closed cubic splines. The first
+node follows the last node, and all integrals are exact.
 """
 
 from __future__ import annotations
@@ -18,18 +18,19 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
-#: Treatment of a cluster that continues beyond an edge of the window; ``inside``: such a cluster is ignored.
+#: Treatment of a cluster that continues beyond an edge of the window; ``inside``: the cluster is ignored.
 #: ``part``: the part inside the window is tested and counted, as if the cluster ended at the edge.
-#: ``clip``: the whole cluster is tested, and the part inside is counted. ``whole``: all of it is tested and counted.
+#: ``clip``: the whole cluster is tested, and the part inside the window is counted.
+#: ``whole``: the whole cluster is tested and counted.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-PARTS = 64  # number of parts of a spacing; lengths in contact are whole numbers of parts
+PARTS = 64  # number of equal parts of the spacing of nodes; lengths in contact are whole numbers of parts
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
-    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m; a parabolic asperity breaks the layer if its curvature exceeds 12 s.
+    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m. A parabolic asperity of curvature above 12 s breaks the layer.
 
-    tau0 is the limiting shear stress of the layer in Pa, and h_c its critical thickness in m.
+    tau0 is the limiting shear stress of the layer in Pa, and h_c is the critical thickness of the layer in m.
     """
     return np.asarray(np.pi * np.asarray(shear_strength) / (12 * np.asarray(E_star) * np.asarray(thickness)))
 
@@ -42,7 +43,7 @@ def _counted(length: float) -> int:
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add `number` to the lengths in contact of `count` successive windows; the first begins at node `begin`.
+    """Add `number` to the lengths in contact of the `count` successive windows from node `begin` on.
 
     `jumps` holds the differences between the lengths in contact of neighbouring windows.
     """
@@ -61,9 +62,9 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
-    """Add the contribution of a cluster to the windows that contain only its beginning or only its end.
+    """Add the contribution of a cluster to the windows that contain only the beginning or only the end of the cluster.
 
-    If `judged` is True, the part of the cluster inside the window is tested, otherwise the whole cluster.
+    If `judged` is True, the part of the cluster inside the window is tested. Otherwise the whole cluster is tested.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
@@ -110,7 +111,7 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
 
 @jit
 def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
-    """Write the lengths in contact of all windows to `jumps`, which must contain zeros."""
+    """Write the lengths in contact of all windows to `jumps`. At first, `jumps` must contain zeros."""
     points = jumps.size - 1
     # a part of a cluster that is longer than `reach` cannot break the layer
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
@@ -164,7 +165,7 @@ class Pair(NamedTuple):
 
 @jit
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
-    """Write the spline coefficients of ``z - h0`` to `overlap`; node p of line 1 faces node q of line 2."""
+    """Write the spline coefficients of ``z - h0`` to `overlap`. Node p of line 1 faces node q of line 2."""
     points = pair.line_1.size
     for k in range(overlap.size):
         overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
@@ -174,7 +175,8 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
     """Return the length of a cluster beyond an edge of the window, and the integral of ``z - h0`` over this length.
 
-    The search covers the distance ``|most|``, to the right of the edge if `most` is positive, else to the left.
+    The search covers the distance ``|most|``, to the right of the edge if `most` is positive, and to the left of the
+    edge otherwise.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -200,7 +202,7 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window; `work` is workspace for ``z - h0`` and its zeros."""
+    """Return the length in intimate contact of one window. `work` is workspace for ``z - h0`` and the zeros."""
     points, pieces = pair.line_1.size, int(np.ceil(window))
     overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
     limit = pair.strength * pair.spacing**2
@@ -241,7 +243,7 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     """Return the length in intimate contact, in parts (see `PARTS`), of each window.
 
     `positions` holds the node of line 1 and the node of line 2 at the left edge of each window. Rolling with creep
-    needs this function (see `creep_positions`); for pure rolling, :func:`contact_lengths` is faster. `window` is the
+    needs this function (see `creep_positions`). For pure rolling, :func:`contact_lengths` is faster. `window` is the
     length of a window in spacings, and `rule` is one of `EDGE_RULES`.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)

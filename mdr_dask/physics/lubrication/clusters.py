@@ -12,12 +12,12 @@ from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
 class Clusters(NamedTuple):
-    """The clusters of a closed line, in the order in which they begin; lengths are in spacings of the nodes.
+    """The clusters of a closed line, in ascending order of `start`. Positions and lengths are in spacings of the nodes.
 
-    If a cluster continues from the last node to the first, its `end` lies beyond the last node: on a line of 100 nodes,
-    a cluster from position 98 to position 3 ends at 103. `total` is the integral of ``z - h0`` in m over each cluster.
-    `overlap`, shape (points + 3,), contains the spline coefficients of ``z - h0`` in m: first the last coefficient of
-    the line, then all coefficients, then the first two again. A cluster breaks the layer if
+    If a cluster continues from the last node to the first node, the `end` lies beyond the last node. For example, on a
+    line of 100 nodes, a cluster from position 98 to position 3 has the `end` 103. `total` is the integral of ``z - h0``
+    in m over each cluster. `overlap`, shape (points + 3,), contains the spline coefficients of ``z - h0`` in m: first
+    the last coefficient of the line, then all coefficients, then the first two again. A cluster breaks the layer if
     ``total > limit (end - start)^3`` (thesis eq. 5.6), with `limit` in m. `closed` means that a single cluster covers
     the whole line.
     """
@@ -44,7 +44,7 @@ def whole_piece(overlap: FloatArray, k: int) -> float:
 
 @jit
 def total(overlap: FloatArray, start: float, end: float) -> float:
-    """Return the integral of a closed spline from `start` to `end`, which may lie beyond the last node."""
+    """Return the integral of a closed spline from `start` to `end`. The position `end` may lie beyond the last node."""
     points = overlap.size - 3
     first, last = int(start), int(end)
     found: float = -integral(piece(overlap, first), start - first)

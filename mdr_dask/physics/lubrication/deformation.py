@@ -1,6 +1,7 @@
-"""Elastic deformation of a half-plane under a piecewise linear pressure; the integrals are exact on any grid.
+"""Elastic deformation of a half-plane under a piecewise linear pressure, with integrals that are exact on any grid.
 
-Hertz units: positions in half widths a, pressures in p0, films and deformations in ``a^2/R`` (thesis eq. B.13, B.19).
+In Hertz units, positions are divided by the half width a, pressures by p0, and films and deformations by ``a^2/R``
+(thesis eq. B.13, B.19).
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 def influence_matrix(nodes: FloatArray) -> FloatArray:
     """Return the matrix D, shape (n, n), with ``delta_i - delta(0) = sum_j D_ij P_j``.
 
-    The first and the last pressure must be zero. The deformation relative to its value at ``X = 0`` is
-    ``-(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
+    The first and the last pressure must be zero. The deformation minus the deformation at ``X = 0`` is ``-(1/pi) int P
+    (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
     """
     n = nodes.size
     matrix, origin = np.empty((n, n)), np.empty(n)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray
 
-STEEL = 210e9 / (2 * (1 - 0.3**2))  # contact modulus of steel on steel in Pa: E = 210 GPa and nu = 0.3 for both
+STEEL = 210e9 / (2 * (1 - 0.3**2))  # contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3
 
 
 class HertzLine(NamedTuple):
@@ -46,7 +46,7 @@ def hertz_line(line_load: ArrayLike, E_star: ArrayLike, radius: ArrayLike) -> He
 
 
 def hertz_gap(x: ArrayLike, half_width: float, radius: float) -> FloatArray:
-    """Return the gap in m between the bodies of a dry line contact; inside the contact it is 0.
+    """Return the gap in m between the bodies of a dry line contact, or 0 inside the contact.
 
     `x` contains distances from the centre of the contact in m.
     """
@@ -65,10 +65,10 @@ def fluid_friction(
 ) -> float:
     """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
 
-    `log_viscosity` returns ln of the viscosity in Pa s at pressures in Pa; all other arguments are in SI units. The
-    sliding velocity must not be zero. The shear stress is ``tau_E asinh(eta v/(h tau_E))``, so the liquid is Newtonian
-    if `eyring_stress` is very large. `film_share` is the fraction of the load, and of the pressure, that the film
-    carries. Rolling friction is not included.
+    `log_viscosity` returns the natural logarithm of the viscosity in Pa s at pressures in Pa. All other arguments are
+    in SI units. The sliding velocity must not be zero. The shear stress is ``tau_E asinh(eta v/(h tau_E))``, where
+    tau_E is `eyring_stress`. If tau_E is very large, the liquid is Newtonian. `film_share` is the fraction of the load,
+    and of the pressure, that the film carries. Rolling friction is not included.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
@@ -140,7 +140,7 @@ class FilmFormula:
     ranges: tuple[tuple[float, float], ...]
 
     def __call__(self, W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
-        """Return h/R; the arrays W, U and G broadcast."""
+        """Return h/R. The arrays W, U and G broadcast."""
         return np.asarray(
             self.factor
             * np.asarray(W, float) ** self.load
@@ -149,7 +149,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Return a message that names the numbers outside their fitted ranges, or an empty string."""
+        """Return a message that names the parameters outside the fitted ranges, or an empty string."""
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
             for symbol, value, (low, high) in zip("WUG", (W, U, G), self.ranges, strict=True)
@@ -168,7 +168,7 @@ PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694,
 DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, _DOWSON_HIGGINSON_RANGES)
 
 
-#: The formulas, by their names in a campaign.
+#: Film formulas by name; campaigns use these names.
 FORMULAS: dict[str, FilmFormula] = {
     "pan_hamrock": PAN_HAMROCK_CENTRAL,
     "pan_hamrock_minimum": PAN_HAMROCK_MINIMUM,
@@ -177,12 +177,12 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, the factor from films in units of ``a^2/R`` to ``h/R``."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. A film in units of ``a^2/R`` times this factor is ``h/R``."""
     return 8 * W / np.pi
 
 
 class Moes(NamedTuple):
-    """Moes' load and lubricant parameters; ``h/R (2 U)^(-1/2)`` depends only on these two numbers."""
+    """Moes' load and lubricant parameters. The film ``h/R (2 U)^(-1/2)`` depends only on these two numbers."""
 
     M: FloatArray
     L: FloatArray
@@ -229,8 +229,9 @@ def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the regime of each case as an index of `REGIMES`.
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. The isoviscous film is
-    therefore the larger of its rigid and elastic limits, and the piezoviscous film the smaller of its two limits. The
-    regime is isoviscous if the isoviscous film is at least as thick as the piezoviscous film.
+    therefore the larger of the two isoviscous limits (rigid and elastic), and the piezoviscous film is the smaller of
+    the two piezoviscous limits. The regime is isoviscous if the isoviscous film is at least as thick as the
+    piezoviscous film.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

@@ -1,4 +1,4 @@
-"""The film of a line contact on one grid, and quantities interpolated between its nodes."""
+"""The film of a line contact on one grid, and quantities interpolated between the nodes."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _SPIKE = 0.01  # least height of a spike above the pressure minimum upstream, di
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``. `spacing` is the distance between two neighbouring nodes times the
-    density of nodes there; this product is the same everywhere on the grid. The film that belongs to a piecewise linear
-    pressure is slightly too thin between the nodes, so :meth:`film_between` interpolates the films at the nodes.
+    `central` is the film at ``X = 0``. `spacing` is the distance between two neighbouring nodes times the density of
+    nodes between them. This product is the same everywhere on the grid. The film under a piecewise linear pressure is
+    slightly too thin between the nodes. :meth:`film_between` therefore interpolates the films at the nodes.
     """
 
     nodes: FloatArray
@@ -33,22 +33,22 @@ class GridSolution:
     spacing: float = np.nan
 
     def film_between(self, positions: FloatArray) -> FloatArray:
-        """Return the film in units of ``a^2/R`` at positions in half widths; NaN upstream of the first node."""
+        """Return the film in units of ``a^2/R`` at positions in half widths, or NaN upstream of the first node."""
         film = _between(self.nodes, self.film, positions, 2)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
         return np.where(positions < self.nodes[0], np.nan, film)
 
     def pressure_between(self, positions: FloatArray) -> FloatArray:
-        """Return the pressure in units of p0 at positions in half widths; zero where there is no film."""
+        """Return the pressure in units of p0 at positions in half widths, or zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, 2), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at other nodes, shifted so that its steep front moves from `self.front` to `front`.
+        """Return the pressure at other nodes, with the steep front of the pressure moved from `self.front` to `front`.
 
         The two nodes around the new front get the pressures half a cell upstream and half a cell downstream of the old
-        front, which are nearly the same on a finer grid.
+        front. These two pressures hardly depend on the grid.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -83,7 +83,7 @@ class GridSolution:
 
     @cached_property
     def spike(self) -> tuple[float, float]:
-        """Position and pressure of the spike, a second pressure maximum near the outlet; NaN if there is no spike."""
+        """Position and pressure of the spike (a second pressure maximum near the outlet), or NaN without a spike."""
         peak, _ = self._spike
         return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
 
@@ -96,7 +96,7 @@ class GridSolution:
 
     @cached_property
     def front(self) -> float:
-        """Position downstream of the spike at which the pressure equals the minimum upstream; NaN without a spike."""
+        """Position behind the spike where the pressure equals the minimum before the spike, or NaN without a spike."""
         peak, lowest = self._spike
         if not peak:
             return float("nan")
@@ -105,7 +105,7 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """Index of the node of the spike, and the lowest pressure between the last two maxima; 0 without a spike."""
+        """Index of the node of the spike, and lowest pressure between the last two maxima; (0, 0) without a spike."""
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
@@ -128,7 +128,7 @@ class GridSolution:
 
 
 def cell_around(nodes: FloatArray, position: float) -> FloatArray:
-    """Return the last node upstream of a position and the first node at or beyond it."""
+    """Return the last node upstream of a position, and the first node at or beyond this position."""
     after = int(np.clip(np.searchsorted(nodes, position), 1, nodes.size - 1))
     return nodes[after - 1 : after + 1]
 
@@ -136,9 +136,9 @@ def cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Predict a quantity on another grid from one or two earlier solutions; `reading` evaluates it on one grid.
+    """Predict the result of `reading` on another grid from the results on one or two earlier grids.
 
-    With two solutions, the error of the quantity is taken as proportional to the square of the spacing.
+    With two grids, the error of the result is taken as proportional to the square of the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:

@@ -1,4 +1,4 @@
-"""Graded grids for a lubricated line contact; positions are in half widths, films in ``a^2/R``.
+"""Graded grids for a lubricated line contact. Positions are in half widths, and films in units of ``a^2/R``.
 
 The nodes are placed according to a given density of nodes along the contact. Two grids with the same density but
 different numbers of nodes are therefore geometrically similar, as Richardson extrapolation requires.
@@ -37,7 +37,7 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the positions that have `wanted` cells before them; beyond the last position, the density is constant."""
+    """Return the positions before which there are `wanted` cells. Beyond the last position, the density is constant."""
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]
@@ -53,8 +53,8 @@ def aligned(
 ) -> tuple[FloatArray, float]:
     """Return about `count` nodes with a given density, and the product of node spacing and density.
 
-    A node lies at `rupture`, where the film ends, so that errors on different grids can be compared. The position
-    `front` (see `GridSolution.front`) lies near the middle of a cell, unless it is NaN.
+    A node lies at `rupture`, where the film ends, so that errors on several grids can be compared. Unless `front` (see
+    `GridSolution.front`) is NaN, this position lies near the middle of a cell.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -67,7 +67,7 @@ def aligned(
 
 
 def _halved_by(share: float, cells: int) -> int:
-    """Return a number n near `cells` for which n times `share` is closest to a whole number plus one half.
+    """Return an integer n near `cells` for which n times `share` is closest to an integer plus one half.
 
     `share` is the number of cells before the front, divided by the number of cells before the end of the film.
     """
@@ -87,7 +87,8 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
     """Return a grid of `count` nodes for an expected central film.
 
-    The nodes are densest at both ends of the dry contact if the film is thin, and around ``X = 0`` if it is thick.
+    The nodes are densest at both ends of the dry contact if the film is thin, and around ``X = 0`` if the film is
+    thick.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     finest = min(0.7 * central_film ** (2 / 3), length)
@@ -112,7 +113,7 @@ def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second derivative at the nodes; both end nodes get the result of the neighbouring node."""
+    """Return the second derivative at the nodes. Both end nodes get the second derivative at the neighbouring node."""
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])

@@ -1,8 +1,9 @@
 """The elastohydrodynamic film of a line contact, in all regimes from rigid isoviscous to elastic piezoviscous.
 
-Hertz units are ``X = x/a``, ``P = p/p0`` and ``H = h R/a^2`` (thesis eq. B.13). With ``E' = 2 E*``, they follow from
-``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. Preliminary solutions of a case determine the density of nodes on
-all grids of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third order in the spacing.
+Hertz units are ``X = x/a``, ``P = p/p0`` and ``H = h R/a^2`` (thesis eq. B.13). With ``E' = 2 E*``, half width and
+maximum pressure are ``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. Preliminary solutions of a case determine
+the density of nodes on all grids of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third
+order in the spacing.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
 
 NODES = (40, 80, 160, 320, 640, 1280)  # numbers of nodes of the grids; a Newton step with 1280 nodes takes about 0.1 s
 ORDER = 3.0  # order of convergence of the values extrapolated from two grids
-ACCURACY = 1e-3  # default relative error of the films
+ACCURACY = 1e-3  # allowed relative error of the films if no accuracy is given
 PRELIMINARY = 2  # the preliminary grids, which determine the density of nodes, have NODES[PRELIMINARY] nodes
 #: Attempts at the first solution of a case; the second attempt is slow but hardly ever fails.
 #: Entries: factor of the expected film; limit of guess / (inlet position)^2; number of nodes; limits of the iteration.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Limits of Newton's method on all further grids; the second limits are for another guess, if the first attempt fails.
+#: Limits of Newton's method on all further grids. If the first attempt fails, the second limits apply to another guess.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
 PLACED = 0.1  # smallest stated error of a position, in cells
-REACH = 2.0  # in cells of the second finest grid: `profile` states the largest error within this distance
+REACH = 2.0  # `profile` states the largest error within this distance, in cells of the second finest grid
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
@@ -43,10 +44,9 @@ Reading = Callable[[GridSolution], float | FloatArray]
 class LineContact(NamedTuple):
     """A case in dimensionless numbers: Moes' numbers `M` and `L`, and the laws of the liquid.
 
-    `pole` is the pressure p_r of Roelands' law divided by p0, and `exponent` is its exponent z; both are zero for
-    Barus' law. `density_rise` and `density_saturation` are the constants of the density law times p0; both are zero for
-    an incompressible liquid. `inlet` is the position where the oil begins, in half widths (negative), or None for a
-    fully flooded inlet.
+    `pole` and `exponent` are p_r / p0 and z of Roelands' law, or zero for Barus' law. `density_rise` and
+    `density_saturation` are the constants of the density law times p0, or zero for an incompressible liquid. `inlet` is
+    the position where the oil begins, in half widths (negative), or None for a fully flooded inlet.
     """
 
     M: float
@@ -64,7 +64,7 @@ class LineContact(NamedTuple):
 
     @property
     def liquid(self) -> Liquid:
-        """Return viscosity and density as functions of pressure; ``alpha p0 = L sqrt(M/(2 pi))``."""
+        """Return viscosity and density as functions of pressure, with ``alpha p0 = L sqrt(M/(2 pi))``."""
         alpha = self.L * float(np.sqrt(self.M / (2 * np.pi)))
         return Liquid(alpha, self.pole, self.exponent, self.density_rise, self.density_saturation)
 
@@ -90,7 +90,7 @@ def line_contact(
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional
-        Viscosity at ambient pressure in Pa s; needed by Roelands' law.
+        Viscosity at ambient pressure in Pa s, needed only for Roelands' law.
     compressible : bool
         Whether the density follows the law of Dowson and Higginson.
     inlet : float, optional
@@ -124,10 +124,11 @@ def line_contact(
 
 @dataclass(frozen=True)
 class LineSolution:
-    """The film of a line contact in Hertz units; if no film was found, `outcome` and `reason` give the cause.
+    """The film of a line contact in Hertz units.
 
-    `grids` are the solutions on all grids, the finest last. `central_film` and `minimum_film` are in units of
-    ``a^2/R``. Without a film, `grids` is empty, and `central_film` and `minimum_film` are NaN.
+    `grids` contains the solutions on all grids, the finest last. `central_film` and `minimum_film` are in units of
+    ``a^2/R``. If no film was found, `outcome` and `reason` give the cause, `grids` is empty, and `central_film` and
+    `minimum_film` are NaN.
     """
 
     case: LineContact
@@ -148,15 +149,16 @@ class LineSolution:
         return float(max(film.error / film.value for film in (self.central_film, self.minimum_film)))
 
     def estimate(self, reading: Reading) -> Estimate:
-        """Return a quantity, such as a traction coefficient, with its error; `reading` evaluates it on one grid."""
+        """Return the extrapolated value and the estimated error of a quantity that `reading` evaluates on one grid."""
         values = [_extrapolated(reading, *pair) for pair in _pairs(self.grids)]
         return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
     def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
-        """Return a profile at ascending positions in half widths; `read` evaluates it on one grid.
+        """Return a profile at ascending positions in half widths. `read` evaluates the profile on one grid.
 
-        The error at a position is the largest estimated error within `REACH` cells, because the estimate vanishes where
-        the profiles of two grids intersect, and because spikes and fronts lie at different positions on the two grids.
+        The error at a position is the largest estimated error within `REACH` cells. The estimate at a single position
+        would vanish where the profiles of two grids intersect, and would ignore that a spike or front moves from grid
+        to grid.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -170,15 +172,15 @@ class LineSolution:
         return Estimate(value, np.where(np.isnan(value), np.nan, largest))
 
     def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths; its stated error is never smaller than `PLACED` cells."""
+        """Return a position in half widths. The stated error is at least `PLACED` cells."""
         found = self.estimate(reading)
         before, after = cell_around(self.finest.nodes, float(found.value))
         return found._replace(error=np.maximum(found.error, PLACED * (after - before)))
 
     def spike(self) -> tuple[Estimate, Estimate]:
-        """Return position (in half widths) and pressure (in p0) of the spike; NaN if there is no spike.
+        """Return position (in half widths) and pressure (in units of p0) of the spike, or NaN if there is no spike.
 
-        Position and pressure are those on the finest grid. The stated error of the pressure is infinite if the finest
+        Position and pressure are taken from the finest grid. The stated error of the pressure is infinite if the finest
         grid does not resolve the spike (see `GridSolution.resolves_spike`).
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
@@ -201,7 +203,7 @@ def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridS
 
 
 def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) -> FloatArray:
-    """Return a quantity extrapolated from two grids; the extrapolation removes the error of second order."""
+    """Return a quantity extrapolated from two grids. The extrapolation removes the error of second order."""
     value, ratio = np.asarray(reading(fine)), (coarse.spacing / fine.spacing) ** 2
     return np.asarray(value + (value - np.asarray(reading(coarse))) / (ratio - 1))
 
@@ -218,7 +220,7 @@ def _error(values: Sequence[FloatArray]) -> FloatArray:
 def _solve_on(
     case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, pace: Pace, spacing: float = np.nan
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on one grid from a guess of the pressure at its nodes."""
+    """Solve on one grid from a guess of the pressure at the nodes."""
     grid = Grid.of(nodes)
     guess = pressure.copy()
     guess[0] = guess[-1] = 0.0
@@ -248,7 +250,7 @@ def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
 def _refined(
     case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on about `count` nodes with the density of `source`; `before` contains the last one or two solutions."""
+    """Solve on about `count` nodes with the density of `source`. `before` contains the last one or two solutions."""
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
     end = float(expected(before, lambda grid: grid.rupture, spacing))
@@ -278,7 +280,8 @@ def solve_film(
     readings : sequence of callable, GridSolution -> float or array
         Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-        One floor for each reading, 0 by default. The error of a reading below its floor is relative to the floor.
+        One floor for each reading, or none if all floors are 0. If a reading is below the floor, the relative error is
+        the error divided by the floor.
 
     Returns
     -------
@@ -297,7 +300,7 @@ def solve_film(
     if outcome != Outcome.CONVERGED:
         return _no_solution(case, outcome, source)
     solved: list[GridSolution] = []
-    # central and minimum film get the larger of their relative errors, as two grids may agree on one film by chance
+    # central and minimum film get the larger of the two relative errors, as two grids may agree on one film by chance
     scales = np.array([source.central_film, source.minimum[1]])
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
 
@@ -333,7 +336,7 @@ def solve_film(
 
 def operations(accuracy: float) -> float:
     """Return the approximate number of operations of `solve_film`: 30 n^2 in each of ten Newton steps on each grid."""
-    # the error is of third order: each finer grid divides it by 8
+    # each finer grid divides the error by 8, because the error is of third order
     grids_needed = 1.0 if accuracy == 0 else min(np.log(1 / accuracy) / np.log(8) / len(NODES), 1.0)
     nodes = np.array([NODES[PRELIMINARY]] * 2 + [*NODES[: round(grids_needed * len(NODES))]])
     return 300.0 * float(np.sum(nodes**2))

@@ -1,9 +1,10 @@
 """Load of a rough contact, shared between film and asperities (Johnson, Greenwood and Poon, Wear 19, 91, 1972).
 
 The film carries the fraction gamma of the load. The rollers are deformed by the whole load, not only by the pressure of
-the film. The film is therefore as thick as in a smooth contact with gamma times the load and gamma times the modulus: W
-stays the same, U becomes ``U/gamma`` and G becomes ``gamma G``. The asperities of a line are springs of the MDR with
-the stiffness ``E* dx``. A line as long as its longest wavelength represents a square area with edges of this length.
+the film. The film is therefore as thick as in a smooth contact with gamma times the load and gamma times the modulus.
+In this smooth contact, W is the same, U is replaced by ``U/gamma``, and G by ``gamma G``. The asperities of a line are
+springs of the MDR with the stiffness ``E* dx``. A line whose length is the longest wavelength represents a square area
+with edges of the same length.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def distance_of_means(gap: float) -> float:
     """Return the distance d (see `mean_overlap`) for a mean gap ``<(d - z)+>``, in units of the rms height."""
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
-    # the mean gap at d is `mean_overlap(-d)`; it is at least d, and its logarithm varies slowly with d
+    # the mean gap at d, `mean_overlap(-d)`, is at least d; the logarithm of the mean gap varies slowly with d
     return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, gap + 1, xtol=1e-13))
 
 
@@ -67,7 +68,7 @@ def share_load(
 
     `film_at` returns the film that carries a given load share, or 0 if the film is too thin to be computed.
     `asperity_share` returns the load share of the asperities at a given film. `film_at` and `asperity_share` are
-    decreasing functions. `tolerance` is the allowed relative error of the film's load share; the relative error of the
+    decreasing functions. `tolerance` is the allowed relative error of the film's load share. The relative error of the
     film is about a quarter of `tolerance`. If no film balances the load, the asperities carry the whole load, and film
     and film share are 0.
     """

@@ -1,9 +1,9 @@
 """Semismooth Newton method for pressure and central film of a lubricated line contact on a given grid, in Hertz units.
 
-The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), in finite
-volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0`` for the pressure P and the flow
-balance R of each volume. The unknowns are the pressures at the nodes and the film at ``X = 0``. The load gives one more
-equation, ``int P dX = pi/2``.
+The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), which is
+integrated over finite volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0`` for the
+pressure P and the inflow minus outflow R of each volume. The unknowns are the pressures at the nodes and the film at
+``X = 0``. The load gives one more equation, ``int P dX = pi/2``.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couet
 _FILM_SHARE = 0.8  # one step may reduce the film at a node by at most this fraction
 _LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
 _SHRINKS = 0.1  # a factorised Jacobian is reused while each step is smaller than this fraction of the previous step
-#: Largest relative size of the last step; the remaining error is about the square of this size.
-#: After a step with a reused Jacobian, the remaining error is larger, so this step must be a hundred times smaller.
+#: Largest relative size of the last Newton step. The remaining error is about the square of this size.
+#: After a step with a reused Jacobian, the remaining error is larger. The last step must then be 100 times smaller.
 _TOLERANCE = 1e-4
 
 
 class Grid(NamedTuple):
-    """Nodes in half widths, their weights in the trapezoidal rule, and the result of `influence_matrix`."""
+    """Nodes in half widths, weights of the nodes in the trapezoidal rule, and the result of `influence_matrix`."""
 
     nodes: FloatArray
     weights: FloatArray
@@ -46,7 +46,7 @@ class Grid(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Largest change of a pressure in one step, divided by the largest pressure, and largest number of steps."""
+    """Largest change of a pressure per step, divided by the largest pressure, and largest number of Newton steps."""
 
     clip: float
     most: int
@@ -65,8 +65,8 @@ class Liquid(NamedTuple):
     """Viscosity and density as functions of pressure, in Hertz units.
 
     `alpha` is the pressure-viscosity coefficient times p0. `pole` is the pressure p_r of Roelands' law divided by p0,
-    and `exponent` is its exponent z; `exponent` is zero for Barus' law. The density is
-    ``rho/rho0 = 1 + rise P/(1 + saturation P)``.
+    and `exponent` is the exponent z of Roelands' law, or zero for Barus' law. The relative density ``rho/rho0`` is ``1
+    + rise P/(1 + saturation P)``.
     """
 
     alpha: float
@@ -78,7 +78,7 @@ class Liquid(NamedTuple):
 
 @jit
 def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
-    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in units of p0."""
+    """Return ``ln(eta/eta0)``, and the derivative with respect to P, at the pressure P in units of p0."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
     ratio = 1.0 + P / liquid.pole
@@ -97,9 +97,10 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
 
 @jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
-    """Return the mean of 1/eta between two nodes, and its derivatives with respect to `left` and `right`.
+    """Return the mean of 1/eta between two nodes, and the derivatives of this mean with respect to `left` and `right`.
 
-    `left` and `right` are the values of ln(eta) at the two nodes. The mean is exact if ln(eta) is linear between them.
+    `left` and `right` are the values of ln(eta) at the two nodes. The mean is exact if ln(eta) is linear between the
+    nodes.
     """
     rise = right - left
     if abs(rise) < 1e-3:
@@ -134,7 +135,8 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 class Imbalance(NamedTuple):
     """Inflow minus outflow of every volume, shape (n,), and the derivatives of this difference, shape (n, 4).
 
-    Row i contains the derivatives with respect to the pressure, or to the film, at the four nodes from i - 2 to i + 1.
+    Row i of `by_pressure` contains the derivatives with respect to the pressures at the four nodes from i - 2 to i + 1.
+    Row i of `by_film` contains the derivatives with respect to the films at the same nodes.
     """
 
     value: FloatArray
@@ -146,7 +148,7 @@ class Imbalance(NamedTuple):
 def balance(
     nodes: FloatArray, liquid: Liquid, K: float, P: FloatArray, H: FloatArray, state: FloatArray, found: Imbalance
 ) -> None:
-    """Write the imbalance of every volume to `found`; `state` is workspace, shape (4, n)."""
+    """Write the imbalance of every volume to `found`. `state` is workspace of shape (4, n)."""
     R, by_pressure, by_film = found
     rho, rho_slope, viscosity, viscosity_slope = state
     for i in range(P.size):
@@ -203,9 +205,10 @@ def _fill_jacobian_row(
 
 @jit
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
-    """Write the indices of the active nodes, whose pressures are unknowns of the Newton step, and return their number.
+    """Write the indices of the active nodes to `active`, and return the number of active nodes.
 
-    An inner node is active if ``P + R/d > 0``, where d estimates the size of dR/dP at this node.
+    The pressures at active nodes are the unknowns of a Newton step. An inner node is active if ``P + R/d > 0``, where d
+    estimates the size of dR/dP at this node.
     """
     R, by_pressure, by_film = found
     count = 0
@@ -290,7 +293,7 @@ def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
 
 @jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
-    """Return the largest fraction of a step that is allowed.
+    """Return the largest allowed fraction of a Newton step.
 
     The film must remain positive, and no pressure may change by more than `clip` times the largest pressure.
     """
@@ -310,8 +313,8 @@ def _take_step(
 ) -> tuple[float, float]:
     """Change P, H and the film at ``X = 0`` by the allowed fraction of a Newton step.
 
-    Return the film at ``X = 0`` and the relative size of the step: infinite for a shortened step, NaN if the film
-    closes.
+    Return the film at ``X = 0`` and the relative size of the step. The size is infinite for a shortened step, and NaN
+    if the film closes.
     """
     share = _step_length(grid, P, H, step, change, clip)
     if not share > _LEAST_SHARE:
@@ -325,7 +328,7 @@ def _take_step(
 
 
 def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
-    """Solve for pressure and film on one grid; the outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
+    """Solve for pressure and film on one grid. The outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
 
     The guessed pressure must be zero at both ends and nowhere negative. The guessed central film must be so large that
     the film is positive at all nodes.

@@ -1,6 +1,6 @@
 """Lubricating oils: viscosity as a function of temperature and pressure, density, and pressure-viscosity coefficient.
 
-Temperatures in K, pressures in Pa, dynamic viscosities in Pa s, kinematic viscosities in m^2/s.
+Temperatures are in K, pressures in Pa, dynamic viscosities in Pa s, and kinematic viscosities in m^2/s.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[flo
     Parameters
     ----------
     temperature : array_like, shape (n,)
-        Temperatures in K; at least two of them have to be different.
+        Temperatures in K. At least two temperatures must be unequal.
     viscosity : array_like, shape (n,)
         Kinematic viscosities in m^2/s at these temperatures.
 
@@ -75,7 +75,7 @@ def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArra
 def density_at(temperature: ArrayLike, density: float, reference_temperature: float) -> FloatArray:
     """Return the density at a temperature in K: ``rho_ref exp(-b dT (1 + 0.8 b dT))`` with ``b = 0.6278/rho_ref``.
 
-    `density` is rho_ref, the density in kg/m^3 at the reference temperature; dT is the difference from that
+    `density` is rho_ref, the density in kg/m^3 at the reference temperature. dT is the temperature minus the reference
     temperature. The formula is from ASTM D1250, table 54D, in which the reference temperature is 60 F.
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
@@ -108,14 +108,14 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
 
 @dataclass(frozen=True)
 class Oil:
-    """An oil, described by the numbers of its data sheet.
+    """An oil, described by the numbers of a data sheet.
 
     Parameters
     ----------
     T1, nu1, T2, nu2 : float
         Two temperatures in K, and the kinematic viscosities in m^2/s at these temperatures.
     density, density_temperature : float
-        Density in kg/m^3, and the temperature in K at which it was measured.
+        Density in kg/m^3, and the temperature in K at which the density was measured.
     correlation : str
         Pressure-viscosity correlation, one of `CORRELATIONS`.
     lowest, highest : float

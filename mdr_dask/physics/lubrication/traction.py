@@ -1,7 +1,7 @@
-"""Friction of a lubricated line contact from the shear of its film.
+"""Friction of a lubricated line contact due to the shear of the film.
 
-The film is computed for pure rolling and an isothermal Newtonian liquid, so slide-roll ratios have to be small. Heating
-and shear thinning would make film and traction smaller.
+The film is computed for pure rolling and an isothermal Newtonian liquid. The slide-roll ratio must therefore be small.
+Heating and shear thinning would make film and traction smaller.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mdr_dask.physics.lubrication.newton import log_viscosities
 def shear_stress(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> FloatArray:
-    """Return the shear stress in the middle of the film at the nodes, in units of p0; zero where there is no film.
+    """Return the shear stress in the middle of the film at the nodes, in units of p0, or zero where there is no film.
 
     The Newtonian stress is ``tau = eta (u1 - u2)/h``, with the slide-roll ratio ``(u1 - u2)/u``. With an Eyring stress
     tau_E in units of p0, the stress is ``tau_E asinh(tau/tau_E)``. The load parameter W is needed for the ratio
@@ -38,6 +38,6 @@ def sliding_coefficient(
 
 
 def rolling_coefficient(grid: GridSolution, W: float) -> float:
-    """Return the rolling friction of one surface, the integral of ``(h/2) dp/dx``, divided by the load."""
+    """Return the integral of ``(h/2) dp/dx``, which is the rolling friction of one surface, divided by the load."""
     film = (grid.film[1:] + grid.film[:-1]) / 2
     return float(2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(grid.pressure)))

@@ -1,7 +1,7 @@
 """Matrices of the MDR transforms on graded panels, for functions that are a polynomial inside each panel.
 
-As functions of z = r^2, both transforms are Abel's half-integrals. Substitutions remove the square roots, so that
-Gauss's rule is exact to rounding.
+If all functions are written as functions of z = r^2, the two MDR transforms are Abel's half-integrals. Substitutions
+remove the square roots, so that Gauss's rule is exact to rounding.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels between `edges`; in each panel, a polynomial through values at the `nodes` represents a function.
+    """Panels between `edges`. In each panel, a function is represented by the polynomial through the values at `nodes`.
 
-    Each panel has `order` nodes: the interior Lobatto points and its right end. There is no node at the first edge, 0,
-    because functions may jump there. `barycentric`, shape (panels, order + 1), holds the weights of barycentric
-    interpolation; in the row of the first panel, only the last `order` weights are used.
+    Each panel has `order` nodes: the interior Lobatto points and the right end of the panel. There is no node at the
+    first edge, 0, because functions may jump at 0. `barycentric`, shape (panels, order + 1), contains the weights of
+    barycentric interpolation. In the row of the first panel, only the last `order` weights are used.
     """
 
     edges: FloatArray
@@ -40,7 +40,7 @@ class Panels:
     `inner`: (1/pi) int_0^z u(z') / sqrt(z - z') dz'
     `full`: (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'
     `outer`: (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'
-    `slope`: u'(z); at the common end of two panels, this is the slope in the left panel
+    `slope`: u'(z), at the common end of two panels in the left panel
     `weights`: weights of the nodes in int_0^1 u dz
     """
 
@@ -53,7 +53,7 @@ class Panels:
 
     @cached_property
     def nodes(self) -> FloatArray:
-        """Nodes of all panels, increasing."""
+        """Nodes of all panels, in ascending order."""
         return self.mesh.nodes
 
 
@@ -128,7 +128,7 @@ def _add_panel(
 
 @jit
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values` at the positions `places`; beyond the mesh the result is 0."""
+    """Return the piecewise polynomial through `values` at the positions `places`, or 0 at positions beyond the mesh."""
     result = np.empty_like(places)
     for number in range(places.size):
         result[number] = value_at(mesh, values, places[number])
@@ -137,7 +137,7 @@ def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArra
 
 @jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
-    """Return the piecewise polynomial through `values` at the position `place`; beyond the mesh the result is 0."""
+    """Return the piecewise polynomial through `values` at the position `place`, or 0 at a position beyond the mesh."""
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order

@@ -1,4 +1,4 @@
-"""Unworn bodies of revolution: the profile f0(r) and its image g0(x).
+"""Profile f0(r) and image g0(x) of an unworn body of revolution.
 
 Lengths are divided by the contact radius a0, and heights by the depth d0, so that g0(1) = 1.
 """
@@ -24,7 +24,7 @@ from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_fact
 
 
 class Image(NamedTuple):
-    """The image g0 for compiled code: a piecewise cubic, or the power law x^exponent if there are no knots.
+    """Image g0 for compiled code, which is a piecewise cubic, or the power law x^exponent if there are no knots.
 
     `coefficients`, shape (4, pieces), belong to the powers 3, 2, 1, 0 of the distance from the left knot of each piece.
     """
@@ -100,7 +100,7 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A body with piecewise cubic f0(r) and g0(x), both in units of d0; `length` is a0 in the unit of the body."""
+    """A body with piecewise cubic f0(r) and g0(x) in units of d0. `length` is a0 in the unit of length of the body."""
 
     curve: PPoly
     image_curve: PPoly
@@ -117,11 +117,11 @@ class TableProfile:
         return self.image_curve.derivative()
 
     def height(self, radius: FloatArray) -> FloatArray:
-        """Return f0(r); NaN beyond the largest radius."""
+        """Return f0(r), or NaN beyond the largest radius."""
         return np.where(radius <= self.largest_radius * (1 + 1e-12), self.curve(np.asarray(radius)), np.nan)
 
     def image(self, position: FloatArray) -> FloatArray:
-        """Return g0(x); NaN beyond the largest radius."""
+        """Return g0(x), or NaN beyond the largest radius."""
         return np.where(position <= self.largest_radius * (1 + 1e-12), self.image_curve(np.asarray(position)), np.nan)
 
     def image_slope(self, position: FloatArray) -> FloatArray:
@@ -129,7 +129,7 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start); for a small gap, the slope is integrated, to avoid cancellation."""
+        """Return g0(start + gap) - g0(start). For a small gap, the slope is integrated to avoid cancellation."""
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -149,7 +149,7 @@ _ABSCISSA, _WEIGHT = gauss(8)
 
 @jit_inline
 def image_rise(image: Image, start: float, level: float, gap: float) -> float:
-    """Return g0(start + gap) - g0(start) without cancellation; `level` is g0(start)."""
+    """Return g0(start + gap) - g0(start) without cancellation. The argument `level` is g0(start)."""
     if image.knots.size == 0:
         n = image.exponent
         if n == 2.0:
@@ -180,9 +180,9 @@ def _piece(image: Image, place: float, derivative: int) -> float:
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
-    """Return the profile of a table of radii and heights, pressed to a depth; all lengths have the same unit.
+    """Return the profile of a body that is given by a table of radii and heights and pressed to a depth.
 
-    The radii begin at 0, and heights are measured from the first height.
+    All lengths have the same unit. The radii begin at 0, and heights are measured from the first height.
     """
     r, f = np.asarray(radius, dtype=float), np.asarray(height, dtype=float)
     check_table(r, f)
@@ -263,7 +263,7 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 
 
 def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
-    """Return the cubic spline through the points if it increases everywhere, else the monotone cubic interpolant."""
+    """Return the cubic spline through the points, or the monotone cubic interpolant if this spline decreases."""
     spline = CubicSpline(x, y)
     fine = (x[:-1, None] + np.diff(x)[:, None] * np.linspace(0.0, 1.0, 9)).ravel()
     falls = np.any(spline(fine, 1) < -1e-9 * np.max(np.abs(spline(fine, 1))))

@@ -1,4 +1,4 @@
-"""The transforms between the profile f(r) of a body of revolution and its image g(x), with an error estimate.
+"""Transforms between the profile f(r) and the image g(x) of a body of revolution, with error estimates.
 
 A substitution x = r sin t, r = x sin t or x = r cosh t removes the square-root singularity of each integral. The
 integrals are split at kinks and jumps, and the number of Gauss nodes is doubled until two results agree.
@@ -29,7 +29,7 @@ def gauss(nodes: int) -> tuple[FloatArray, FloatArray]:
 
 
 def power_factor(exponent: ArrayLike) -> FloatArray:
-    """Return kappa = sqrt(pi)/2 n Gamma(n/2) / Gamma((n+1)/2): the profile c r^n has the image kappa c |x|^n."""
+    """Return kappa = sqrt(pi)/2 n Gamma(n/2) / Gamma((n+1)/2). The profile c r^n has the image kappa c |x|^n."""
     n = np.asarray(exponent, dtype=float)
     return np.asarray(0.5 * np.sqrt(np.pi) * n * gamma(0.5 * n) / gamma(0.5 * (n + 1.0)))
 
@@ -46,15 +46,15 @@ def inverse_transform(
     radius : array_like, shape (m,)
         Radii r >= 0.
     breaks : sequence of float
-        Places where g or one of its derivatives jumps.
+        Positions where g or a derivative of g jumps.
     tolerance : float
         Allowed error, relative to the largest value.
 
     Returns
     -------
     Estimate
-        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx; f(0) = g(0). The estimated error exceeds the tolerance if 1024
-        nodes per piece are not enough.
+        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx, with f(0) = g(0). The estimated error exceeds the tolerance if
+        1024 nodes per piece are not enough.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def forward_transform(
     jumps: Sequence[tuple[float, float]] = (),
     tolerance: float = 1e-10,
 ) -> Estimate:
-    """Transform the profile f(r) into its image g(x): thesis eq. 2.4 plus the height f(0) of the apex.
+    """Transform the profile f(r) into the image g(x) by thesis eq. 2.4, and add the height f(0) of the apex.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def forward_transform(
     apex : float
         f(0).
     breaks : sequence of float
-        Places where a derivative of f jumps.
+        Radii where a derivative of f jumps.
     jumps : sequence of (radius, height)
         Radii where f itself jumps, and the heights of the jumps.
     tolerance : float
@@ -143,7 +143,7 @@ def pressure(
     contact_radius : float
         Half-width a of the one-dimensional contact.
     edge_gap : float
-        Line load d - g just inside the contact edge; under a flat punch it is not zero.
+        Line load d - g just inside the contact edge. Under a flat punch, this line load is not zero.
     jumps : sequence of (position, height)
         Positions inside the contact where g itself jumps, and the heights of the jumps.
 
@@ -195,7 +195,7 @@ def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
 
 
 def _integrate(integrand: Function, edges: FloatArray, tolerance: float = 1e-10) -> Estimate:
-    """Return the integral over all pieces; the number of nodes is doubled until two successive results agree."""
+    """Return the integral over all pieces. The number of nodes is doubled until two successive results agree."""
     nodes = 8
     coarse = _gauss_sum(integrand, edges, nodes)
     while True:

@@ -1,8 +1,8 @@
 """The transforms of piecewise linear functions on a uniform grid, with exact integrals over each cell.
 
-With the cell width h, the error of the inverse transform is proportional to h^2, and that of the forward transform to
-h^1.5. The error of the pressure is proportional to h and largest next to the axis. Unlike the panels of
-`half_integrals`, this grid is suitable for functions with any number of kinks.
+With the cell width h, the error of the inverse transform is proportional to h^2, and the error of the forward transform
+is proportional to h^1.5. The error of the pressure is proportional to h, and is largest next to the axis. Unlike the
+panels of `half_integrals`, this grid is suitable for functions with any number of kinks.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class UniformGrid:
-    """Nodes 0, h, 2h, ... and matrices, shape (n, n): f = inverse @ g, g = forward @ f and p / E* = stress @ q.
+    """Nodes 0, h, 2h, ... and (n, n) matrices with f = inverse @ g, g = forward @ f and p / E* = stress @ q.
 
     The line load q is d - g inside the contact and zero outside.
     """
@@ -44,7 +44,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p / E* at the nodes; in the last cell, the line load falls linearly to zero at the contact edge."""
+        """Return p / E* at the nodes. In the cell of the contact edge, the line load falls linearly to zero."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -68,7 +68,7 @@ class UniformGrid:
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
     def depth(self, image: FloatArray, force: float) -> float:
-        """Return the depth at which F_N / E* equals `force`, by Newton's method; the force is convex in the depth."""
+        """Return the depth at which F_N / E* equals `force`, by Newton's method (the force is convex in the depth)."""
         depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)]))
         for _ in range(60):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)
@@ -106,8 +106,8 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`.
 
-    For r = low = 0, where the integral diverges, the result is 2: the slope of the line load is taken as proportional
-    to x in the first cell, and the integral of slope / x is then twice the mean slope.
+    For r = low = 0, the integral diverges, and the result is 2. This is the integral of slope / x in the first cell,
+    divided by the mean slope, if the slope of the line load is proportional to x.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

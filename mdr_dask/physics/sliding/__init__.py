@@ -1,4 +1,5 @@
 """Steady sliding of a viscoelastic foundation over a line at a prescribed load.
 
-Read `problem` first: it chooses the solver, and refines the grid until the results have the requested accuracy.
+Read the module `problem` first, which chooses the solver and refines the grid until the results have the requested
+accuracy.
 """

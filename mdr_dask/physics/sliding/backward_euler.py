@@ -1,8 +1,8 @@
-"""Steady state of a Kelvin foundation by backward Euler, as in the papers, for many cases on one line.
+"""Steady states of a Kelvin foundation in many cases on one line, by backward Euler as in the papers.
 
 The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height. The decay per
-step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes.
-As u is periodic, the forces are sums over the nodes:
+time step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two
+nodes. As u is periodic, the forces are sums over the nodes:
 
     F_N / (4 G dx) = sum of u_i
     F_x / (4 G) = sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1))
@@ -26,29 +26,29 @@ from mdr_dask.physics.sliding.cases import Cases, first_depths
 ITERATIONS = 200
 COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
 COARSEST = 64  # the search for the depth starts on a grid with at most this number of nodes
-CONVERGED = 1e-9  # allowed product of the last two relative steps of the depth, which estimates the error of the drag
+CONVERGED = 1e-9  # allowed product of the last two relative changes of the depth (estimated error of the drag)
 COARSE = 1e-3  # used instead of CONVERGED on all grids except the finest
 
 BLOCK = 256  # number of nodes in a block
 LANES = 8  # number of cases in one vector instruction
 
-# Indices of the results of a sweep for every case
+# Rows of `Lanes.sums`
 CARRIED, STIFFNESS, DRAG = range(3)
 SUMS = 3
-# Columns of `Nodal.blocks`. STEEPEST is the smallest rise, and BEFORE the height of the node before the block.
+# Columns of `Nodal.blocks`. STEEPEST is the smallest rise, and BEFORE is the height of the node before the block.
 # HEIGHTS, RISES, WORK and SQUARES are the sums of height, rise, height times rise, and rise squared over the block.
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 # Rows of `Lanes.state`: displacement u (U), and the derivative of u with respect to the depth (FADE).
-# THROUGH is the decay factor of u over a free block, and MEMORY the sum of the decay factors at the nodes of the block.
-# LOAD, RATE and LOSS are sums over the nodes of a block: of u, of FADE and of the drag.
+# THROUGH is the decay factor of u over a free block. MEMORY is the sum of the decay factors at the nodes of the block.
+# LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block.
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
 
 class Nodal(NamedTuple):
-    """Heights of a line at its nodes, and the rise from the previous node to each node.
+    """Heights of a line at the nodes, and the rise from the previous node to each node.
 
-    `blocks` contains the results of `_blocks`. A periodic line ends at its highest node.
+    `blocks` contains the results of `_blocks`. A periodic line ends at the highest node.
     """
 
     height: FloatArray
@@ -58,7 +58,7 @@ class Nodal(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Sliding cases: v tau in cell widths, the decay lambda per step, and the penetration of the highest node."""
+    """Distance v tau in cell widths, decay lambda per time step, and penetration of the highest node, for each case."""
 
     deborah: FloatArray
     decay: FloatArray
@@ -68,11 +68,10 @@ class Moving(NamedTuple):
 class Lanes(NamedTuple):
     """Work arrays of a sweep.
 
-    `state`, shape (ROWS, cases), is the state of each case; after the sweep the rows `U` and `FADE` contain the
-    displacement at the end of the line and its derivative with respect to the depth. `packed` contains copies of state,
-    decay and depth of the cases in the queue, one column per case. `queue` contains the cases in which contact begins
-    or ends in the current block. `sums`, shape (SUMS, cases), contains the sum of u, its derivative with respect to the
-    depth, and (1 - lambda) F_x / (4 G).
+    `state`, shape (ROWS, cases), contains the rows `U` to `LOSS`. After the sweep, the rows `U` and `FADE` contain u
+    and du/d(depth) at the end of the line. `packed` contains copies of state, decay and depth of the cases in the
+    queue, one column per case. `queue` contains the indices of the cases in which contact begins or ends in the current
+    block. `sums`, shape (SUMS, cases), contains the sum of u, the sum of du/d(depth), and (1 - lambda) F_x / (4 G).
     """
 
     state: FloatArray
@@ -171,7 +170,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
         packed[U, q], packed[FADE, q] = workspace[U, k], workspace[FADE, k]
         packed[ROWS, q], packed[ROWS + 1, q] = decay[k], depth[k]
         packed[LOAD, q] = packed[RATE, q] = packed[LOSS, q] = 0.0
-    # add zeros until the last vector instruction is full, because full instructions are faster
+    # fill the last vector instruction with zeros, because full instructions are faster
     full = -(-queued // LANES) * LANES
     packed[:, queued:full] = 0.0
     _walk(height, rise, packed[ROWS, :full], packed[ROWS + 1, :full], packed)
@@ -218,9 +217,9 @@ def _newton(
     drags: FloatArray,
     outside: NDArray[np.bool_],
 ) -> None:
-    """Find the depth and the drag of every case; the guesses in `depths` are replaced by the solutions.
+    """Find the depth and the drag of every case, and replace the guesses in `depths` by the solutions.
 
-    The load is a convex, increasing function of the depth, so that Newton's method approaches the solution from above.
+    Newton's method approaches the solution from above, because the load is a convex, increasing function of the depth.
     The drag is extrapolated from the last two sweeps to the final depth. If no depth is found, the drag is NaN.
     """
     count = depths.size
@@ -266,7 +265,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """For every case, write the number of nodes in contact to `touched`, and the rms rise to these nodes to `slope`."""
+    """Write the number of nodes in contact to `touched`, and the rms rise at these nodes to `slope`, for every case."""
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -286,9 +285,9 @@ def contact(
 def steady_by_steps(
     height: FloatArray, periodic: bool, deborah: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return three arrays: depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
+    """Return the penetration of the highest node, F_x / (4 G), and whether an end of the line is in contact.
 
-    A periodic line must end at its highest node. Deborah numbers are v tau / dx, loads are F_N / (4 G dx) in the unit
+    A periodic line must end at the highest node. Deborah numbers are v tau / dx. Loads are F_N / (4 G dx), in the unit
     of height.
     """
     strides = [1]

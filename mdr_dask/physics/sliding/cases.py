@@ -1,4 +1,4 @@
-"""Cases of steady sliding on one line (the input of every solver), and their steady states (the output)."""
+"""Cases of steady sliding on one line (the input of every solver), and steady states (the output)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from mdr_dask.physics.outcome import Outcome
 Scheme = Literal["hermite", "backward_euler"]
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
-"""Names of the results of a case; an array of results has its rows in this order."""
+"""Names of the results of a case, in the order of the rows of an array of results."""
 
 
 class Cases(NamedTuple):
-    """Deborah numbers and loads of cases on one line; entry k of each array belongs to case k."""
+    """Deborah numbers and loads of cases on one line. Entry k of each array belongs to case k."""
 
     deborah: FloatArray
     loads: FloatArray
@@ -35,7 +35,7 @@ def first_depths(loads: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady states; entry k of each array belongs to case k.
+    """Steady states of several cases. Entry k of each array belongs to case k.
 
     Parameters
     ----------
@@ -64,12 +64,12 @@ class Steady:
 
     @classmethod
     def of(cls, columns: FloatArray, status: NDArray[np.int8]) -> Steady:
-        """Return steady states from an array with one row per result; results of failed cases become NaN."""
+        """Return steady states from an array with one row per result. The results of failed cases become NaN."""
         drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
         return cls(drag, depth, fraction, slope, status)
 
 
 def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
-    """Return for each case whether its Deborah number and its load are positive and finite."""
+    """Return for each case whether the Deborah number and the load are positive and finite."""
     good: NDArray[np.bool_] = np.isfinite(deborah) & np.isfinite(loads) & (deborah > 0) & (loads > 0)
     return good

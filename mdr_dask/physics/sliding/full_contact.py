@@ -1,4 +1,4 @@
-"""Full contact of any linear solid with a rough plane; the problem is linear, so that each wave is solved separately.
+"""Full contact of any linear solid with a rough plane, a linear problem that is solved separately for each wave.
 
 The displacement is u = d + h, with the depth d and the height h. The height is a sum of waves. Wave k, with the
 wavenumber q_k and the amplitude c_k, causes the pressure G*(q_k v) c_k, where G* is the complex modulus (thesis eq.
@@ -23,11 +23,11 @@ from mdr_dask.physics.surfaces.waves import series
 
 
 def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
-    """Return the steady states of the cases in full contact with a plane; all other cases get `Outcome.INVALID`.
+    """Return the steady states of the cases in full contact with a plane. All other cases get `Outcome.INVALID`.
 
-    `terms` contains the two numbers G_m / G_inf and tau_m v / L for each Prony term; it is empty for a Kelvin solid.
-    The Deborah number of a case is that of the dashpot, eta v / (G_inf L). The load is F_N / (4 G_inf L), in the unit
-    of height; in full contact it is equal to the mean displacement.
+    `terms` contains the pair (G_m / G_inf, tau_m v / L) for each Prony term, and is empty for a Kelvin solid. The
+    Deborah number of a case is eta v / (G_inf L), where eta is the viscosity of the dashpot. The load, in the unit of
+    height, is F_N / (4 G_inf L). In full contact, the load is equal to the mean displacement.
     """
     deborah, loads = cases
     pressure, slope = line.nodes
@@ -39,7 +39,7 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     # drag: mean of pressure times slope; the static pressure adds no drag, as the mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    # the nodes of extreme slope, or of extreme pressure without the dashpot, exclude full contact in most cases
+    # in most cases, the nodes of extreme slope or extreme pressure (without dashpot) suffice to exclude full contact
     worst = [pressure.argmin(), pressure.argmax(), slope.argmin(), slope.argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch

@@ -1,10 +1,10 @@
-"""One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
+"""Sweep along a line of cubic cells, which gives the steady state of a Kelvin foundation at a given depth.
 
-The unit of length is the cell width, a slope is the rise over one cell, and ``deborah`` is the distance v tau in cells.
-Heights are measured from the highest point of the line, so that the penetration is w = depth + height with depth > 0.
-The displacement of an element is u = w in contact; at the distance s after contact ends, u and du/d(depth) have decayed
-by the factor exp(-s / deborah). If the depth changes, the shift of the places where contact begins and ends changes the
-load only to second order.
+The unit of length is the cell width, a slope is the rise over one cell, and ``deborah`` is the distance v tau in cell
+widths. Heights are measured from the highest point of the line, so that the penetration is w = depth + height with
+depth > 0. The displacement of an element is u = w in contact. At the distance s behind the place where contact ends, u
+and du/d(depth) have decayed by the factor exp(-s / deborah). If the depth changes, contact begins and ends at slightly
+shifted places. This shift changes the load only to second order.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is passed in one step
 TINY = 1e-290  # smaller displacements are set to 0
-CLOSE = 1e-8  # Newton's method ends after a step shorter than this (in cells); the next step would be a rounding error
+CLOSE = 1e-8  # Newton's method ends after a step of less than this part of a cell; the next step would be rounding
 ITERATIONS = 80
 
-# Indices of the results of a sweep
+# Indices of the `sums` of a sweep
 DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
 SUMS = 7
 
 
 class Blocks(NamedTuple):
-    """For every block of cells: the largest height, and the integrals of the height and of the squared slope."""
+    """Largest height in every block of cells, and integrals of the height and of the squared slope over every block."""
 
     peak: FloatArray
     mean: FloatArray
@@ -46,7 +46,7 @@ def _four(column: FloatArray, i: int) -> float:
 
 @jit
 def blocks_of(cells: Cells) -> Blocks:
-    """Return the complete blocks of a line; the cells that remain at the end of the line belong to no block."""
+    """Return the complete blocks of a line. The cells that remain at the end of the line belong to no block."""
     blocks = (cells.mean.size - 1) // BLOCK
     peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     for block in range(blocks):
@@ -63,9 +63,9 @@ def blocks_of(cells: Cells) -> Blocks:
 class Barriers(NamedTuple):
     """Limits of the depth for each cell and each block, at one Deborah number.
 
-    At depths above the limit `cell` or `block`, the force on elements in contact is positive everywhere in the cell or
-    block. At depths up to `idle`, the force on elements in contact is positive nowhere in the cell. The limit of a
-    block is NaN until the limits of its cells are computed.
+    At depths above the entry in `cell`, the force on elements in contact is positive everywhere in the cell. The entry
+    in `block` is the same limit for a whole block, or NaN until the limits of the cells in the block are computed. At
+    depths up to the entry in `idle`, the force on elements in contact is positive nowhere in the cell.
     """
 
     cell: FloatArray
@@ -83,7 +83,7 @@ def barriers_for(cells: int) -> Barriers:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the barriers of a block and of its cells, computed from the force w + deborah w'."""
+    """Write the barriers of a block and of the cells in the block, computed from the force w + deborah w'."""
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
         h0, a, b, c = cubic(height, enter, leave, i)
@@ -116,7 +116,7 @@ def _decayed(x: float) -> float:
 
 @jit
 def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
-    """Return the first place between `start` and 1 where the force falls to 0, or `NONE`.
+    """Return the first position between `start` and 1 in a cell where the force falls to 0, or `NONE`.
 
     The force is w + deborah w', with w = w0 + a x + b x^2 + c x^3. At `start`, the force must not be negative.
     """
@@ -158,7 +158,7 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 
 class FreeElement(NamedTuple):
-    """A free element, with the displacement u at the place `start` of a cell.
+    """A free element with the displacement u at the position `start` in a cell.
 
     The penetration in the cell is w = w0 + a x + b x^2 + c x^3.
     """
@@ -173,9 +173,10 @@ class FreeElement(NamedTuple):
 
 @jit
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
-    """Return the place x between `low` and `high` where the line reaches a free element.
+    """Return the position x between `low` and `high` where the line reaches a free element.
 
-    The displacement of the element is u exp(-(x - start) / deborah). At `high` the line must be above the element.
+    The displacement of the element is u exp(-(x - start) / deborah). At `high`, the penetration w must exceed this
+    displacement.
     """
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
@@ -198,10 +199,10 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 
 @jit
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
-    """Return the first place between `low` and `stop` where contact with a free element begins, or `NONE`.
+    """Return the first position between `low` and `stop` where contact with a free element begins, or `NONE`.
 
-    Contact begins at most once in each interval of positive force w + deborah w', because there (w - u) exp(x /
-    deborah) increases, with the displacement u of the free element.
+    In an interval of positive force w + deborah w', the function (w - u) exp(x / deborah) increases, where u is the
+    displacement of the free element. Contact therefore begins at most once in this interval.
     """
     w0, a, b, c, u, start = element
     for _ in range(3):
@@ -220,7 +221,7 @@ def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float
 
 @jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
-    """Return the integrals of w and of w'^2 from `start` to `end`; Gauss's rule with three nodes is exact."""
+    """Return the integrals of w and of w'^2 from `start` to `end` by Gauss's rule with three nodes, which is exact."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
     x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
     before, centre, after = (
@@ -235,10 +236,10 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return the load and the drag of a free recovery, each followed by its derivative with respect to the depth.
+    """Return the load, d(load)/d(depth), the drag and d(drag)/d(depth) of a free recovery.
 
-    The derivative of the drag includes the shift of the place where contact begins again, at which the line has the
-    slope `slope`.
+    The derivative of the drag includes the shift of the place where contact begins again. At this place, the line has
+    the slope `slope`.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -249,7 +250,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells in which a free element stays free; return the next cell, and u at the start of the next cell."""
+    """Skip cells in which a free element stays free. Return the next cell, and u at the start of this next cell."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -267,13 +268,13 @@ def _skip_free(
 def sweep_cells(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: FloatArray
 ) -> int:
-    """Move one element once along the line; return the number of contact patches.
+    """Move one element once along the line, and return the number of contact patches.
 
-    Limits in `barriers` that are still NaN are computed when they are needed. The entries of `sums` are: the integral
-    of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its derivative; the
-    length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not periodic is in
-    contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the first `capacity` patches begin
-    and end; further patches are only counted.
+    Limits in `barriers` that are still NaN are computed when they are needed. `sums` receives, in this order: the
+    integral of u, f = F_N / (4 G dx); df/d(depth); g = F_x / (4 G); dg/d(depth); the length in contact; the integral of
+    w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
+    `places`, shape (2, capacity), receives the positions where the first `capacity` patches begin and end. Further
+    patches are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -293,9 +294,10 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # `left`: place where the last contact ended; `u` and `free`: displacement at this place, at the start of the cell
+    # `left` is the place where the last contact ended, `u` is the displacement at this place,
+    # and `free` is the displacement at the start of the current cell
     u = free = left = 0.0
-    # a period ends at the highest point, inside the last cell, which is a copy of the first cell
+    # a period ends at the highest point, inside the last cell; the last cell is a copy of the first cell
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:
@@ -353,7 +355,7 @@ def sweep_cells(
                 begins[patches] = i + begin
         x = 0.0
         i += 1
-    # the last free recovery extends to the highest point of a periodic line, otherwise to infinity
+    # the last free recovery extends to the highest point of a periodic line, or to infinity beyond any other line
     if not contact:
         travelled = n + start - left if cells.periodic else np.inf
         slope = enter[n] if cells.periodic and start == 0 else 0.0
@@ -378,7 +380,7 @@ def sweep_cells(
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the positions where the contact patches begin, and the positions where they end; see `sweep_cells`."""
+    """Return the positions where the contact patches begin, and the positions where the patches end."""
     n = cells.mean.size - 1
     places = np.empty((2, n // 8 + 2))
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)

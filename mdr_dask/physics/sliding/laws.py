@@ -34,7 +34,7 @@ def alpha(hurst: Any) -> Any:
 
 
 def full_contact(force: Any, velocity: Any) -> Any:
-    """Return mu / slope in full contact; the underlying law mu = 4 eta v L slope^2 / F_N is exact (eq. 3.14)."""
+    """Return mu / slope in full contact. The underlying law mu = 4 eta v L slope^2 / F_N is exact (eq. 3.14)."""
     return 4 * math.sqrt(2) * velocity / force
 
 
@@ -71,8 +71,8 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
 def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
     """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
 
-    Only one parabolic tip is in contact; kappa is its curvature at the summit, in 1/m. The contact extends from the
-    summit to the distance a = sqrt(F_N / (2 eta v kappa)) ahead of it. The rms slope in contact is kappa a / sqrt 3 =
-    mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
+    Only one parabolic tip is in contact. The curvature of this tip at the summit is kappa, in 1/m. The contact extends
+    from the summit to the distance a = sqrt(F_N / (2 eta v kappa)) ahead of the summit. The rms slope in contact is
+    kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
     """
     return 2 / 3 * np.sqrt(curvature * force / (2 * viscosity * velocity))

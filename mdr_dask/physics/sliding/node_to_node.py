@@ -1,14 +1,14 @@
-"""Steady sliding of a Kelvin foundation along a periodic line: a fast, approximate solver for many cases at once.
+"""Fast, approximate solver for steady sliding of a Kelvin foundation along a periodic line, in many cases at once.
 
-The unit of length is the cell width: neighbouring nodes have the distance 1, and the Deborah number De is the distance
-v tau divided by the cell width. Inside a cell, the penetration w (depth plus height) is a cubic. The places where
-contact begins and ends are computed approximately. The load is the integral of w in contact and of u out of contact.
-The drag is the integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of the drag are positive,
-so that nothing cancels in slow sliding. In full contact the results are exact on any grid.
+The unit of length is the cell width, which is the distance between neighbouring nodes. The Deborah number De is the
+distance v tau divided by the cell width. Inside a cell, the penetration w (depth plus height) is a cubic. The places
+where contact begins and ends are computed approximately. The load is the integral of w in contact and of u out of
+contact. The drag is the integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of the drag are
+positive, so that nothing cancels in slow sliding. In full contact the results are exact on any grid.
 
-If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms.
-In all other blocks, the solver follows one element from cell to cell. The results of a case are the same if further
-cases are solved in the same call.
+If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms. In all
+other blocks, the solver follows one element from cell to cell. The results of a case do not depend on other cases in
+the same call.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ WING = 4  # number of nodes on each side of a cell from which the finer nodes in
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes that `refine` needs before and after the period
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
-# Columns of `Nodes.blocks`. PEAK bounds the height; LOWEST and STEEPEST are the smallest nodal height and slope.
+# Columns of `Nodes.blocks`. PEAK is an upper bound of the height. LOWEST and STEEPEST are the smallest height and the
+# smallest slope at the nodes.
 # HEIGHTS and SQUARES are the integrals of the height and of the squared slope over a block.
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 # Rows of a tile (a part of a line on a finer grid). HEIGHT and SLOPE begin at the node before the tile.
@@ -47,10 +48,11 @@ IN_A_TILE = 5
 class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
-    `height` is measured from the first node, at the height `top`; `slope` is the rise per cell, and `ends` contains the
-    results of `_ends_of` or is empty. The arrays `height`, `slope` and `ends` begin with the last `BEFORE` nodes of the
-    previous period, and end with the first `AFTER` nodes of the next period. `rise` is the height of the highest point
-    above the first node. The highest point is in the cell before the first node; on coarse grids, `rise` is 0.
+    `height` is measured from the first node, which has the height `top` on the original line. `slope` is the rise per
+    cell. `ends` contains the results of `_ends_of` or is empty. The arrays `height`, `slope` and `ends` begin with the
+    last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. `rise` is the
+    height of the highest point above the first node. The highest point is in the cell before the first node. On coarse
+    grids, `rise` is 0.
     """
 
     height: FloatArray
@@ -100,7 +102,7 @@ def _write_nodes(
     stride: int,
     line: Nodes,
 ) -> None:
-    """Write the arrays of `line`; `corrections` contains the results of `_ends_of`."""
+    """Write the arrays of `line`. The argument `corrections` contains the results of `_ends_of`."""
     h, s, ends, blocks = line.height, line.slope, line.ends, line.blocks
     n = h.size - BEFORE - AFTER
     _write_periodic(height, first, stride, h)
@@ -132,7 +134,7 @@ def _write_nodes(
 
 @jit
 def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatArray) -> None:
-    """Write every `stride`-th value from `first` on for one period, and for `BEFORE` and `AFTER` nodes around it."""
+    """Write every `stride`-th value of a period that begins at `first`, with `BEFORE` and `AFTER` further nodes."""
     n, place = written.size - BEFORE - AFTER, first
     for i in range(BEFORE, BEFORE + n):
         written[i] = values[place]
@@ -153,9 +155,9 @@ def _integrals(
     mean: FloatArray,
     square: FloatArray,
 ) -> None:
-    """Write the integrals over each cell: of the height to `mean`, and of the squared slope to `square`.
+    """Write the integral of the height over each cell to `mean`, and the integral of the squared slope to `square`.
 
-    The input arrays begin one node before the first cell; `square` needs one entry more than there are cells. The
+    The input arrays begin one node before the first cell. `square` needs one entry more than there are cells. The
     trapezium rule is corrected with `of_height` and `of_square`, the results of `_ends_of`. If `of_height` is empty,
     the Euler-Maclaurin formula gives the corrections, with derivatives from heights and slopes at neighbouring nodes.
     """
@@ -176,7 +178,7 @@ def _integrals(
 
 @jit_uncounted
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
-    """Write the largest height in each cell; the first cell begins at the second node of `h`."""
+    """Write the largest height in each cell to `peak`. The first cell begins at the second node of `h`."""
     for k in range(cells):
         h0, h1, s0, s1 = h[k + 1], h[k + 2], s[k + 1], s[k + 2]
         rise = h1 - h0
@@ -192,7 +194,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write the tile for `cells` cells of the line, beginning at node `first`; return the number of cells of the tile.
+    """Write the tile for `cells` cells of the line, from node `first` on, and return the number of cells of the tile.
 
     Each cell of the line is divided into ``weights.shape[1]`` cells of the tile.
     """
@@ -238,7 +240,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
     """Write heights and slopes at the nodes of a finer grid in the given cells, and at one fine node on each side."""
     refinement = weights.shape[1]
     for step in range(refinement):
-        # the first node is in the cell before the given cells, the last two nodes in the cell after them
+        # the first fine node is in the cell before the given cells; the last two are in the cell after the given cells
         for cell in range(-1 if step == refinement - 1 else 0, cells + 1 if step < 2 else cells):
             h, s = line.height[first + cell + 1 - WING :], line.slope[first + cell + 1 - WING :]
             value, rate = 0.0, 0.0
@@ -250,7 +252,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
 
 
 def with_summit(line: Nodes) -> Nodes:
-    """Return the line with the computed `rise`; the highest point must be in the cell before the first node."""
+    """Return the line with the computed `rise`. The highest point must be in the cell before the first node."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))
     refine(line, BEFORE - 1, 1, table, height, slope)
@@ -294,7 +296,7 @@ def _fading(time: float) -> float:
 
 
 class Cell(NamedTuple):
-    """Penetration w = w0 + s0 x + a x^2 + b x^3 of one case in a cell; at x = 1, w is w1 and w' is s1."""
+    """Penetration w = w0 + s0 x + a x^2 + b x^3 of one case in a cell. At x = 1, w is w1 and w' is s1."""
 
     w0: float
     s0: float
@@ -328,7 +330,7 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return the place in a cell where contact ends, w at this place, and the fraction of w left at the cell's end.
+    """Return the place where contact ends in a cell, w at this place, and the fraction of w left at the cell's end.
 
     The Deborah number is `r`, and `inverse` is 1 / r. The force falls from `force` at the place `begins` to `force_end`
     at the end of the cell. One Newton step improves the place that is found by linear interpolation of the force.
@@ -348,9 +350,9 @@ def _contact_end(
 
 @jit_inline_fused
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
-    """Return the place where a free element meets the line, and the fraction of its displacement u that remains there.
+    """Return the place where a free element meets the line, and the fraction of u that remains at this place.
 
-    The displacement of the element is u at the start of the cell; `inverse` is 1 / De. At the place `last` the gap
+    At the start of the cell, the displacement of the element is u. `inverse` is 1 / De. At the place `last` the gap
     between element and line is `gap_last` < 0. One Newton step improves the place at which a parabola through the gaps
     at the start of the cell and at `last` crosses 0.
     """
@@ -374,10 +376,10 @@ def _contact_in_cell(
 ) -> tuple[bool, float, float, float, float]:
     """Return whether a free element comes into contact in a cell, and four numbers about the end of the contact.
 
-    The displacement of the element is u at the start of the cell; without contact it would be `kept` at the end of the
-    cell. The four numbers are: the place where the contact ends (1 if contact continues in the next cell); w at this
-    place; the fraction of w that remains at the end of the cell; and the gap that an element without contact would have
-    at this place.
+    At the start of the cell, the displacement of the element is u. If no contact began, the displacement at the end of
+    the cell would be `kept`. The four numbers are: the place where the contact ends (1 if contact continues in the next
+    cell); w at this place; the fraction of w that remains at the end of the cell; and the gap that an element without
+    contact would have at this place.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -543,7 +545,7 @@ def sweep(
 
 @jit
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
-    """Write the constants of case k to the workspace; `cells` is the number of cells in a block."""
+    """Write the constants of case k to the workspace. The argument `cells` is the number of cells in a block."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
     workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
@@ -559,13 +561,14 @@ def _search(
     rates: FloatArray,
     results: FloatArray,
 ) -> None:
-    """Find the depths of cases on a grid by Newton's method; extrapolate the results over the last step of the depth.
+    """Find the depths of cases on a grid by Newton's method, and extrapolate the results over the last Newton step.
 
-    The search ends after a step of at most `LAST_STEP` times the depth, if the estimated relative error of the
-    extrapolated drag is at most `error`. `depths` contains the penetrations of the summit; the first guesses are
-    replaced by the solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms of the results with
-    respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS), receives drag, contact
-    fraction and contact slope, and is not changed if no depth is found.
+    The search ends if the last Newton step is at most `LAST_STEP` times the depth, the estimated relative error of the
+    extrapolated drag is at most `error`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses of
+    the penetration of the summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the
+    derivatives of the logarithms of the results with respect to the depth, or NaN if unknown, and is updated.
+    `results`, shape (cases, SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth
+    is found.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -645,7 +648,7 @@ class NodeToNode:
         return self._solution(results, depths - top, level)
 
     def _start(self) -> Solution:
-        """Solve all cases on finer and finer grids; the last grid has one node per Nyquist point."""
+        """Solve all cases on finer and finer grids, and return the solution with one node per Nyquist point."""
         height, loads = self._rough.nodes[0], self._cases.loads
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
@@ -660,11 +663,12 @@ class NodeToNode:
         return self._solution(results, self._depth, 1)
 
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
-        """Return the results on a grid, with the errors due to a contact patch that the grid does not resolve.
+        """Return the results on a grid, with the possible errors due to a contact patch that the grid does not resolve.
 
         A contact patch of at most about one cell may lie between two nodes, and be missing on two successive grids. The
-        missing patch makes the length in contact too small, and the rms slope of the contact too large, because the
-        slope is small near a summit; the relative error of the slope is at most half that of the length.
+        missing patch makes the length in contact too small. Because the slope is small near a summit, the missing patch
+        makes the rms slope in contact too large. The relative error of the rms slope is at most half the relative error
+        of the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,4 +1,4 @@
-"""Steady sliding of a solid over a line, in dimensionless quantities; a case is a pair of speed and load.
+"""Steady sliding of a solid over a line, in dimensionless quantities. A case is a pair of speed and load.
 
 Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If `oversampling` is "auto", a closed
 form is also used for full contact of any solid with a rough plane. All other cases are solved by one of three modules:
@@ -27,13 +27,13 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
-"""Floors of `Steady.columns`: the error of a result below its floor is relative to the floor.
+"""Floors of `Steady.columns`. If a result is below the floor, the relative error is the error divided by the floor.
 
 The floor of the depth is the unit of height, which is the rms height.
 """
 NODE_LEVELS = tuple(
     2**k for k in range(12)
-)  # nodes per Nyquist point; grids with more than 2 are used only where contact begins or ends
+)  # nodes per Nyquist point; more than 2 are used only in blocks in which contact begins or ends
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
 GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
 ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contact patches are shorter than a cell
@@ -55,11 +55,11 @@ class PronyTerms:
 class Request:
     """The requested results, and either the requested accuracy or a given grid.
 
-    `accuracy` is the allowed relative error; for small results see `FLOORS`. `oversampling` is the number of nodes per
-    Nyquist point; "auto" selects the smallest number that meets the accuracy. The scheme for a Kelvin solid is
-    "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). `with_errors` = False omits the error
-    estimates, but only for a Kelvin solid on a given grid. `contact` requests contact fraction and contact slope, which
-    need finer grids than drag and depth.
+    `accuracy` is the allowed relative error (for small results see `FLOORS`). `oversampling` is the number of nodes per
+    Nyquist point, or "auto" for the smallest number of nodes that meets the accuracy. The scheme for a Kelvin solid is
+    "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). If `with_errors` is False, the errors of
+    a Kelvin solid on a given grid are not estimated. `contact` requests contact fraction and contact slope, which need
+    finer grids than drag and depth.
     """
 
     accuracy: float = 0.01
@@ -77,14 +77,14 @@ class Request:
 def solve(
     line: RoughLine, terms: PronyTerms | None, deborah: FloatArray, loads: FloatArray, request: Request
 ) -> tuple[Steady, FloatArray]:
-    """Return the steady states of a solid that slides over a line, and their errors, shape (4, cases).
+    """Return the steady states of a solid that slides over a line, and the errors of the results, shape (4, cases).
 
-    Positions on the line are in units of its length. A Kelvin solid has no `terms`. The Deborah number is that of the
-    dashpot, eta v / (G_inf L); for a Kelvin solid it is equal to v tau / L. The load is F_N / (4 G_inf L), in the unit
-    of height.
+    Positions on the line are divided by the length of the line. For a Kelvin solid, `terms` is None. The Deborah number
+    is eta v / (G_inf L), where eta is the viscosity of the dashpot. The number is equal to v tau / L for a Kelvin
+    solid. The load is F_N / (4 G_inf L), in the unit of height.
 
-    The errors are the absolute discretisation errors of `Steady.columns`, infinite if they are not estimated. A case
-    that misses the accuracy on the finest grid is returned with its errors.
+    The errors are the absolute discretisation errors of `Steady.columns`, or infinite if the errors are not estimated.
+    If a case misses the accuracy even on the finest grid, the results and errors on the finest grid are returned.
     """
     cases = Cases(deborah, loads)
     if terms is not None:
@@ -109,7 +109,7 @@ def solve(
 
 
 def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
-    """Solve every case of a Kelvin solid on the coarsest grid that meets the accuracy."""
+    """Solve every case of a Kelvin solid on the coarsest grid whose results meet the accuracy."""
     on_plane = request.scheme == "hermite" and line.body is None
     columns, errors, status = _in_full_contact(line, PronyTerms(), cases) if on_plane else _unsolved(cases)
     left = np.flatnonzero(valid(*cases) & (status != Outcome.CONVERGED))
@@ -133,7 +133,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 
 
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
-    """Solve cases by sweeps over whole lines; the search for the depth starts from the depth on the previous grid."""
+    """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -147,7 +147,7 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
 
 
 def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int, depths: FloatArray | None) -> Steady:
-    """Solve cases on a grid, without an estimate of the errors; the search starts from the given depths."""
+    """Solve cases on a grid without an estimate of the errors. Sweeps over cubic cells start from the given depths."""
     nodes = line.points * oversampling
     if request.scheme == "hermite":
         return steady.steady_sliding(line.cubic(nodes), *cases, depths)
@@ -155,7 +155,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Store new results; replace a solution only if the new one is accurate, or has a smaller error of the drag."""
+    """Store new results. A solution is kept unless the new result is accurate or has a smaller error of the drag."""
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]
@@ -166,7 +166,7 @@ def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntA
 def _in_full_contact(
     line: RoughLine, terms: PronyTerms, cases: Cases
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
-    """Return results, errors and status of cases on a plane; without full contact the status is `Outcome.INVALID`."""
+    """Return results, errors and status of cases on a plane. The status is INVALID if contact is not full."""
     pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
     full = steady_full_contact(line, pairs, cases)
     errors = ROUNDING * np.abs(full.columns)
@@ -192,7 +192,7 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
     solids = [prony(1.0, terms.moduli, terms.deborah, deborah[k]) for k in left]
     searches = [viscoelastic.ViscoelasticCase(solid, load) for solid, load in zip(solids, loads[left], strict=True)]
     line = line.from_summit()
-    # number of cells of the coarsest grid; every later result is extrapolated from its grid and the previous grid
+    # number of cells of the coarsest grid; results on a finer grid are extrapolated from this and the previous grid
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
 
     def solve(level: int, some: IntArray) -> Solution:

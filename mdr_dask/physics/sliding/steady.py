@@ -1,4 +1,4 @@
-"""Steady sliding of a Kelvin foundation over a line: the search for the depth at which a given load is carried."""
+"""Search for the depth at which a Kelvin foundation carries a given load in steady sliding over a line."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ ITERATIONS = 200
 PATIENCE = 20  # after this number of sweeps, the search continues by bisection
 LOST = 1e-13  # rounding errors dominate if the rise in `_is_lost` is below this fraction of the depth
 # A trail describes the depth as a function of the load near the last sweep.
-# Entries of a trail: log depth, log load, slope d(log depth) / d(log load), derivative of the slope, Deborah number.
+# Entries of a trail: log depth, log load, slope d(log depth) / d(log load), d(slope) / d(log load), Deborah number.
 TRAIL = 5
-# a lattice depth is a depth with this number of significant binary digits; only such depths are tried
+# a lattice depth is a depth with this number of significant binary digits; the search tries lattice depths only
 LATTICE_BITS = 20
 
 
@@ -75,7 +75,7 @@ def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -
 
 @jit
 def _guess(trail: FloatArray, load: float) -> float:
-    """Return a guess of the depth for a load: extrapolate the logarithm of the depth from the `trail`."""
+    """Return a guess of the depth for a load by extrapolation of the logarithm of the depth from the `trail`."""
     ahead = np.log(load) - trail[1]
     bend = 0.5 * trail[3] * ahead
     limit = 0.5 * trail[2]
@@ -83,7 +83,7 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 
 class _Swept(NamedTuple):
-    """A line: cells, blocks, barriers at one Deborah number, and the mean height relative to the highest point."""
+    """Cells and blocks of a line, barriers at one Deborah number, and mean height relative to the highest point."""
 
     cells: Cells
     blocks: Blocks
@@ -97,9 +97,9 @@ def _solve(
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
-    Full contact gives an upper bound of the depth, and so does each tangent to the carried load, which is a convex,
-    increasing function of the depth. The result does not depend on the guess in `trail`. `sums` receives the sums at
-    the returned depth.
+    The depth cannot exceed the depth in full contact. The carried load is a convex, increasing function of the depth.
+    The depth therefore cannot exceed the depth at which any tangent to this function reaches `load`. The result does
+    not depend on the guess in `trail`. `sums` receives the sums at the returned depth.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -146,11 +146,11 @@ def _states(
     results: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
-    """Solve cases on one line at one Deborah number, in ascending order of the load.
+    """Solve cases on one line at one Deborah number. The loads of the cases must be ascending.
 
-    `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the guess for the case, or,
-    if the guess is NaN, from the trail of the previous case. The first case starts from the trail in `first`;
-    afterwards `first` contains the trail of the first case that was solved.
+    `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the entry of the case in
+    `guesses`, or from the trail of the previous case if this entry is NaN. For the first case, the trail in `first`
+    replaces the trail of the previous case. Afterwards, `first` contains the trail of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))
@@ -186,8 +186,8 @@ def steady_sliding(
     Parameters
     ----------
     line : CubicLine
-        From :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line` or `indented_line`. An element of the
-        foundation meets the nodes in ascending order of their index.
+        Line from :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line` or `indented_line`. An element of the
+        foundation meets the nodes in ascending order of the index.
     deborah : array, shape (cases,)
         v tau / L.
     loads : array, shape (cases,)
@@ -230,9 +230,9 @@ def steady_on_cells(
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
     """Return the steady states by backward Euler, the time-stepping method of the papers.
 
-    The arguments are those of `steady_sliding`. Only the heights of the nodes are used. In each time step the body
-    travels one cell; the method is of first order in the cell width. Contact fraction and contact slope take extra
-    time, and are computed only if `contact` is True.
+    See `steady_sliding` for the first three arguments. Only the heights of the nodes are used. In each time step the
+    body travels one cell. The error is proportional to the cell width. Contact fraction and contact slope take extra
+    computing time, and are computed only if `contact` is True.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -243,7 +243,7 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Convert lengths to cells, and solve the cases whose Deborah number and load are finite and positive."""
+    """Convert lengths to cell widths, and solve the cases whose Deborah number and load are finite and positive."""
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
@@ -293,7 +293,7 @@ def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bo
 
 
 def _stepped(line: CubicLine, cases: Cases, contact: bool) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve cases by time steps of one cell; Deborah numbers are v tau / dx, loads are F_N / (4 G dx)."""
+    """Solve cases by time steps of one cell. Deborah numbers are v tau / dx, and loads are F_N / (4 G dx)."""
     n = line.enter.size
     nodes = line.height[:n] if line.periodic else line.height
     highest = int(np.argmax(nodes))

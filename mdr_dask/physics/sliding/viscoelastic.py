@@ -1,8 +1,8 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
 The stretch (elongation of the spring) of Prony term m is e_m = u - a_m, where u is the displacement of the element and
-a_m the displacement of the dashpot of the term. Newton's method finds the depth and, on a periodic line, the stretches
-at the first node, which must be the same after one period.
+a_m the displacement of the dashpot of the term. On a periodic line, Newton's method finds the depth and the stretches
+at the first node. These stretches must be the same after one period. Under an indenter, only the depth is unknown.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine
 TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
 LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step
 SWEEPS = 80
-DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one step
-SHORTEST = 1e-9  # in cells; the dashpot and all Prony terms with a smaller tau_m v become one term: see `travelling`
+DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one Newton step
+SHORTEST = 1e-9  # in cell widths; dashpot and all Prony terms with smaller tau_m v become one term: see `travelling`
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
-ORDER = 2.0  # order of convergence without extrapolation; with extrapolation it is higher if many cells are in contact
+ORDER = 2.0  # order of convergence without extrapolation; with extrapolation, higher if many cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
 
 
 @dataclass(frozen=True)
 class ViscoelasticSteady:
-    """A steady state; if the solver did not converge, all values are NaN.
+    """A steady state. If the solver did not converge, all values are NaN.
 
     The four values are F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (for an indenter:
     of the points of height 0); fraction of the line in contact; and rms slope of the part of the line in contact. The
@@ -56,15 +56,15 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
     The force on an element of width dx is f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'], where u is the
     displacement of the element and a_m the displacement of the dashpot of Prony term m (thesis 3.3.3, extended to any
-    linear rheology). At the distance s the element is either in contact, with u = w(s) = d + h(s), or free, with f = 0;
-    d is the depth and h the height of the line.
+    linear rheology). At the distance s, the element is either in contact, with u = d + h(s), or free, with f = 0. Here
+    d is the depth, and h is the height of the line.
 
     Parameters
     ----------
     line : CubicLine
-        The line. Only the heights at the nodes are used; neighbouring nodes are connected by straight lines. The number
-        of cells must be a multiple of four, because the case is also solved with only every second and only every
-        fourth node.
+        The line. Only the heights at the nodes are used, and neighbouring nodes are connected by straight lines. The
+        number of cells must be a multiple of four, because the case is also solved with only every second and only
+        every fourth node.
     solid : LinearSolid
         The material, with the Deborah numbers tau_m v / L as `times` and eta v / L as `viscosity`.
     load : float
@@ -78,7 +78,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
     Notes
     -----
-    The sweep along a line with straight cells is exact. The result is extrapolated from two solutions: with all nodes,
+    The sweep along a line with straight cells is exact. The result is extrapolated from the solutions with all nodes
     and with every second node. For the error estimate, another result is extrapolated from the solutions with every
     second and every fourth node. The error is estimated from the difference of the two extrapolated results.
     """
@@ -102,7 +102,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
 
 class ViscoelasticCase:
-    """One case, solved on finer and finer lines; each line has twice as many cells as the previous one."""
+    """One case, solved on finer and finer grids. Each grid has twice as many cells as the previous grid."""
 
     def __init__(self, solid: LinearSolid, load: float) -> None:
         if not (np.isfinite(load) and load > 0):
@@ -116,7 +116,7 @@ class ViscoelasticCase:
         """Solve the case on the next finer grid.
 
         From the second grid on, the results are extrapolated from the last two grids. A periodic line begins and ends
-        at its highest node, which must be a node of every grid.
+        at the highest node. This node must be a node of every grid.
         """
         cells = height.size - 1
         summit = float(np.max(height))
@@ -143,10 +143,11 @@ class ViscoelasticCase:
     def _solve(
         self, below: FloatArray, load: float, solid: Travelling, periodic: bool, start: FloatArray | None
     ) -> tuple[Outcome, FloatArray, FloatArray]:
-        """Solve the case on one grid; return the outcome, the state and the four results.
+        """Return the outcome, the state and the four results on one grid.
 
-        The computed depth is the penetration of the highest node. If `start`, the state on the previous grid, is None
-        or has another number of terms, the search starts from the contact at rest.
+        The state contains the stretches at the first node and the depth. The depth is the penetration of the highest
+        node. The search starts from `start`, the state on the previous grid. If `start` is None or has another number
+        of Prony terms, the search starts from the contact at rest.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -185,10 +186,10 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
 
 
 class Swept(NamedTuple):
-    """The solid, and the alternating free recoveries and contacts (pieces) of a sweep.
+    """A solid, and the pieces of a sweep, which are alternately free recoveries and contacts.
 
-    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). A free recovery has the decay lengths of the
-    recovery modes, a contact those of the Prony terms. `lengths` contains the lengths of the pieces.
+    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). The decay lengths of a free recovery are
+    `solid.times`, and the decay lengths of a contact are `solid.deborah`. `lengths` contains the lengths of the pieces.
     """
 
     decayed: FloatArray
@@ -200,10 +201,10 @@ class Swept(NamedTuple):
 def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray) -> None:
     """Multiply the matrix of derivatives of a Newton step by given changes of the unknowns.
 
-    The entries of `direction` are changes of the stretches e_m at the start of the line, and of the depth. `product`
-    receives the changes of the integrals of all e_m, and of the integral of u. Shifts of the places where contact
-    begins and ends are neglected, because their effect is of second order. If the line is not periodic, the recovery
-    beyond the line is included. `workspace`, shape (3, terms), is overwritten.
+    `direction` contains the changes of the stretches e_m at the start of the line, then the change of the depth.
+    `product` receives the changes of the integrals of all e_m, then the change of the integral of u. Shifts of the
+    places where contact begins and ends are neglected, because the effect of a shift is of second order. If the line is
+    not periodic, the recovery beyond the end of the line is included. `workspace`, shape (3, terms), is overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -252,9 +253,9 @@ def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
     `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u. `scale` contains
-    the magnitudes of the derivatives of all integrals. The matrix, with every row divided by its scale, is the identity
-    plus a smooth operator with fast decreasing singular values, so that four to seven products of the matrix and a
-    vector are enough for any number of terms.
+    the magnitude of the derivative of each integral with respect to the matching unknown. If every row is divided by
+    the scale of the row, the matrix is the identity plus a smooth operator with fast decreasing singular values. Four
+    to seven products of the matrix and a vector are therefore enough for any number of terms.
     """
     n = residual.size
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -323,13 +324,13 @@ def solve_sliding(
 ) -> int:
     """Find the depth at a given load, and on a periodic line also the stretches e_m at the first node.
 
-    In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u, `strain_area` = F_N / (4 G_inf dx). After the first step, Newton's method approaches the solution
-    from above, because the displacement is a convex, increasing function of the unknowns.
+    In the steady state, the integral of the stress is equal to the integral of u. Both integrals must be equal to the
+    load, `strain_area` = F_N / (4 G_inf dx). After the first step, Newton's method approaches the solution from above,
+    because the displacement is a convex, increasing function of the unknowns.
 
-    Heights are relative to the highest node, which is the first and the last node of a periodic line. On a line that is
-    not periodic, elements enter undeformed and recover beyond the end of the line, and the depth is the only unknown.
-    `unknown` contains the stretches e_m at the first node, then the depth; the first guesses are replaced by the
+    Heights are relative to the highest node. A periodic line begins and ends at the highest node. On any other line,
+    elements enter undeformed and recover beyond the end of the line, and the depth is the only unknown. `unknown`
+    contains first guesses of the stretches e_m at the first node, then of the depth. The guesses are replaced by the
     solution. `totals` receives the `totals` of the last `Passage`. Return an `Outcome`, which is `OUTSIDE_LINE` if an
     element is in contact at the end of a line that is not periodic.
     """
@@ -359,7 +360,7 @@ def solve_sliding(
             scale[terms] = totals[3]
             newton_step(residual, scale, swept, workspace, step)
         else:
-            # the direction 1 for all unknowns: if the depth changes suddenly, each stretch changes by the same amount
+            # if the depth changes suddenly, each stretch changes by the same amount as the depth
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
             # use the integral of the stress as the load, because the integral of u beyond the line may be unknown

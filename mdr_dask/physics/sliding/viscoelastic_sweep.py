@@ -1,9 +1,9 @@
 """Exact sweep of a linear viscoelastic foundation along a line of straight cells.
 
 The unit of length is the cell width, and stresses are divided by the static modulus. The stretch e_m of the spring in
-Prony term m obeys de_m/ds = du/ds - e_m / deborah_m, where s is the travelled distance and deborah_m the distance tau_m
-v. In contact, u is the penetration w, and the stretches have closed forms. A free element recovers as a sum of
-exponential modes.
+Prony term m obeys de_m/ds = du/ds - e_m / deborah_m, where s is the travelled distance, and deborah_m is the distance
+tau_m v. In contact, u is the penetration w, and the stretches have closed forms. The displacement of a free element is
+a sum of exponential modes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mdr_dask.physics.jit import jit
 
 
 class Travelling(NamedTuple):
-    """A sliding solid and its recovery modes.
+    """A sliding solid and the recovery modes of the solid.
 
     Stresses are divided by the static modulus, and lengths by the cell width. The Prony terms are in ascending order of
     the Deborah number tau_m v / dx. `times` are the decay lengths of the recovery modes. Row k of `stretch_of` contains
@@ -34,7 +34,7 @@ class Travelling(NamedTuple):
 
 @jit
 def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:
-    """Write the product of a matrix and a vector; ``columns[k]`` is column k of the matrix."""
+    """Write the product of a matrix and a vector. ``columns[k]`` is column k of the matrix."""
     product[:] = 0.0
     for k in range(vector.size):
         factor = vector[k]
@@ -46,7 +46,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray) -> None:
     """Write the factors `decay`, `gain` and `area` of every Prony term for a straight piece of the given length.
 
-    If e is the stretch at the start of the piece, the stretch at its end is decay * e + gain * slope, and the integral
+    If e is the stretch at the start of the piece, the stretch at the end is decay * e + gain * slope, and the integral
     of the stretch over the piece is gain * e + area * slope.
     """
     for m in range(deborah.size):
@@ -66,7 +66,7 @@ def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: Fl
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:
-    """Return the stress and its derivative at the distance `length` from the start of a straight piece."""
+    """Return the stress and d(stress)/ds at the distance s = `length` from the start of a straight piece."""
     pressure, rate = start + slope * length, slope
     for m in range(moduli.size):
         decayed = -np.expm1(-length / deborah[m])
@@ -123,7 +123,7 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
 
 @jit
 def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:
-    """Return the strain of a free element after a distance, and its derivative with respect to the distance."""
+    """Return the strain of a free element after a distance, and the derivative of the strain along the distance."""
     strain, rate = 0.0, 0.0
     for k in range(times.size):
         term = modes[k] * np.exp(-distance / times[k])
@@ -136,11 +136,12 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:
-    """Return the position where an element that is free from `place` on meets the line again, or -1 if it does not.
+    """Return the position where an element that is free from `place` on meets the line again, or -1 without contact.
 
     The search begins in the cell that ends at `node`. If contact ended inside a cell, the search must begin in the next
-    cell, because the convex strain does not meet the same straight cell again. Nodes below an exponential that touches
-    the strain are skipped: the logarithm of the strain is convex, so that the exponential is a lower bound.
+    cell, because the convex strain does not meet the same straight cell again. The logarithm of the strain is convex,
+    so that an exponential function that touches the strain is a lower bound of the strain. Nodes below this lower bound
+    are skipped.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -164,11 +165,11 @@ def _next_contact(
 class Passage(NamedTuple):
     """The results of a sweep.
 
-    `lengths` contains the lengths of free recoveries and contacts, which alternate; the first length is that of a free
-    recovery and may be 0. For n nodes, the array needs at least 2 n + 2 entries. `imbalance` contains the integral of
-    each e_m over the line. The six entries of `totals` are: integral of u; integral of the stress; integral of the
-    stress times the slope; length in contact; integral of slope^2 over the length in contact; integral of u beyond the
-    end of the line.
+    `lengths` contains alternately the lengths of free recoveries and of contacts. The first entry is the length of a
+    free recovery and may be 0. For n nodes, the array `lengths` needs at least 2 n + 2 entries. `imbalance` contains
+    the integral of each e_m over the line. The six entries of `totals` are: integral of u; integral of the stress;
+    integral of the stress times the slope; length in contact; integral of slope^2 over the length in contact; and
+    integral of u beyond the end of the line.
     """
 
     lengths: FloatArray
@@ -187,9 +188,9 @@ def sweep_line(
 ) -> tuple[int, bool]:
     """Move an element once along the line, and write the lengths and integrals to `passage`.
 
-    `start` contains the stretches e_m at the first node, for an element whose displacement is the penetration there. If
-    `undeformed` is True, elements enter undeformed and out of contact instead. `workspace` has the shape (10,
-    max(terms, 1)). Return the number of lengths, and whether the element is in contact at the last node.
+    `start` contains the stretches e_m at the first node, where the displacement is equal to the penetration. If
+    `undeformed` is True, `start` is ignored, and the element enters undeformed and out of contact. `workspace` has the
+    shape (10, max(terms, 1)). Return the number of lengths, and whether the element is in contact at the last node.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -242,11 +243,11 @@ def _contact(
     totals: FloatArray,
     workspace: FloatArray,
 ) -> tuple[float, float, float, bool]:
-    """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
+    """Move an element in contact from `begin` until the stress falls to zero or the line ends (see `sweep_line`).
 
     Return the final place of the element, the strain and the stress at this place, and whether contact ends before the
-    line. The stretches are written to ``workspace[0]``. The node at which the search for the next contact begins is
-    ``workspace[2, 0]``.
+    end of the line. The stretches are written to ``workspace[0]``. The node at which the search for the next contact
+    begins is ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -292,7 +293,7 @@ def _contact(
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:
-    """Write the stretches at the end of a straight piece, where the strain is `strain`, and return the stress there."""
+    """Write the stretches at the end of a straight piece with the final strain `strain`. Return the final stress."""
     pressure = strain
     for m in range(moduli.size):
         following[m] = factors[0, m] * e[m] + factors[1, m] * slope
@@ -304,7 +305,7 @@ def _stretch(
 def begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:
-    """Write the recovery modes of an element after its strain has suddenly decreased from `strain` by `excess`.
+    """Write the recovery modes of an element whose strain has suddenly decreased from `strain` by `excess`.
 
     The stretch of the fastest Prony term is adjusted so that the stress is exactly zero.
     """
