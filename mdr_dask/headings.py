@@ -48,7 +48,7 @@ cycles, number of cycles, N, zyklen, zyklenzahl
 )  # fmt: skip
 #: Words before or after the name of a quantity that do not change the meaning of the name.
 IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured", "linear"}
-#: Units that may be joined to a name, as in ``freq_hz``. Each key is the unit as it appears in the name, in lower case.
+#: Units that may be joined to a name, as in ``freq_hz``. The keys are in lower case.
 JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}
 JOINED |= {"c": "degC"}
 _ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ"})
@@ -182,7 +182,7 @@ def _agrees(unit: str, column: Column) -> bool:
 
 
 def fits(unit: str, column: Column) -> bool:
-    """Return whether a unit has the dimension of a column. An empty unit has none."""
+    """Return whether a unit has the dimension of a column. Return False for an empty unit."""
     try:
         factors(unit, column.unit)
     except ValueError:

@@ -30,7 +30,7 @@ _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 class Document:
     """The data of a YAML file, and the YAML nodes from which the data were read."""
 
-    # Path of the file, and its text.
+    # Path and text of the file.
     source: str
     text: str
     # Mappings, lists, texts, numbers, truth values and None.

@@ -68,7 +68,7 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """Yield every number or text, also in lists, after the path of its parameter and its own path in the document."""
+    """Yield every number or text, also in lists, with the path of its parameter and its own path in the document."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if key in RANGES and isinstance(inner, list):

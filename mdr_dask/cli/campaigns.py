@@ -59,7 +59,7 @@ def models(name: str | None, form: str | None) -> None:
 
 
 def _indented(path: str) -> str:
-    """Return the last part of a dotted name, indented by two spaces for each of the other parts."""
+    """Return the last part of a dotted name, indented by two spaces for each part before the last part."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 

@@ -63,7 +63,7 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The letter of numpy for the data type, such as ``f`` for floats."""
+        """The letter that numpy uses for the data type, such as ``f`` for floats."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
