@@ -81,7 +81,7 @@ def fluid_friction(
 
 
 def thick_film(film: float) -> str:
-    """Return a message if a film h/R is too thick for lubrication theory, otherwise an empty string."""
+    """Return a message if a film h/R is too thick for lubrication theory, or an empty string."""
     if not film > 0.1:  # up to this height, a roller differs from a parabola by a few per cent at most
         return ""
     return (

@@ -48,7 +48,7 @@ def inverse_transform(
     breaks : sequence of float
         Positions where g or a derivative of g jumps.
     tolerance : float
-        Allowed error, relative to the largest value.
+        Allowed error of f, relative to the largest value of f.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def forward_transform(
     jumps : sequence of (radius, height)
         Radii where f itself jumps, and the heights of the jumps.
     tolerance : float
-        Allowed error, relative to the largest value.
+        Allowed error of g, relative to the largest value of g without `apex` and `jumps`.
 
     Returns
     -------

@@ -191,7 +191,7 @@ def steady_sliding(
     deborah : array, shape (cases,)
         v tau / L.
     loads : array, shape (cases,)
-        F_N / (4 G L), the mean displacement, in the unit of height.
+        F_N / (4 G L), which is the mean displacement, in the unit of height.
     guesses : array, shape (cases,), optional
         Depths at which the searches start; the results do not depend on the guesses.
 

@@ -41,9 +41,9 @@ DRAG, DEPTH, FRACTION, SLOPE = range(4)
 class ViscoelasticSteady:
     """A steady state. If the solver did not converge, all values are NaN.
 
-    The four values are F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (for an indenter:
-    of the points of height 0); fraction of the line in contact; and rms slope of the part of the line in contact. The
-    errors are absolute discretisation errors.
+    The entries of `values` are F_x / (4 G_inf), in the unit of height squared; the penetration of the mean line (for an
+    indenter: of the points of height 0); the fraction of the line in contact; and the rms slope of the part of the line
+    in contact. `errors` contains absolute discretisation errors.
     """
 
     values: FloatArray
