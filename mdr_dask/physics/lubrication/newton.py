@@ -21,7 +21,7 @@ from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
 _QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; the rest is linear upwind
-_FILM_SHARE = 0.8  # one step may reduce the film at a node by at most this fraction
+_FILM_SHARE = 0.8  # one Newton step may reduce the film at a node by at most this fraction
 _LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
 _SHRINKS = 0.1  # a factorised Jacobian is reused while each step is smaller than this fraction of the previous step
 #: Largest relative size of the last Newton step. The remaining error is about the square of this size.
@@ -343,7 +343,7 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
-        # at least two steps are taken, because the first step may be small by chance
+        # at least two Newton steps are taken, because the first step may be small by chance
         if steps > 1 and size < last and same:
             return Iterate(Outcome.CONVERGED, P, central, H)
         if steps == pace.most:

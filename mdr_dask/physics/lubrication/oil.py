@@ -42,8 +42,8 @@ def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[flo
     Raises
     ------
     ValueError
-        If there are fewer than two temperatures, a viscosity is below 2 mm^2/s (where D341 needs more terms), or the
-        viscosity does not fall with temperature.
+        If all temperatures are equal, a viscosity is below 2 mm^2/s (where D341 needs more terms), or the viscosity
+        does not fall with temperature.
 
     Examples
     --------
@@ -191,9 +191,9 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
     Parameters
     ----------
     law : str
-        ``barus``: ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands``: ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with
-        ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa.
-        Both laws have the slope alpha at ambient pressure.
+        ``barus`` is the law ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands`` is the law
+        ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa.
+        At ambient pressure, the derivative with respect to p is alpha in both laws.
     pressure : array_like
         Pressure in Pa.
     viscosity, alpha : array_like

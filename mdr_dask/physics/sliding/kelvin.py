@@ -4,7 +4,7 @@ The unit of length is the cell width, a slope is the rise over one cell, and ``d
 widths. Heights are measured from the highest point of the line, so that the penetration is w = depth + height with
 depth > 0. The displacement of an element is u = w in contact. At the distance s behind the place where contact ends, u
 and du/d(depth) have decayed by the factor exp(-s / deborah). If the depth changes, contact begins and ends at slightly
-shifted places. This shift changes the load only to second order.
+shifted places. The effect of this shift on the load is of second order.
 """
 
 from __future__ import annotations

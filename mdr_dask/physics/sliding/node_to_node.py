@@ -266,7 +266,7 @@ RESOLVED = 10  # a grid is fine enough only if at least this number of cells is 
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # the search ends after a step of at most this fraction of the depth
+LAST_STEP = 0.03  # the search ends after a Newton step of at most this fraction of the depth
 SECANT_ERROR = 0.1  # assumed error of the extrapolation over the last step, divided by the extrapolated change
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid

@@ -80,8 +80,8 @@ def solve(
     """Return the steady states of a solid that slides over a line, and the errors of the results, shape (4, cases).
 
     Positions on the line are divided by the length of the line. For a Kelvin solid, `terms` is None. The Deborah number
-    is eta v / (G_inf L), where eta is the viscosity of the dashpot. The number is equal to v tau / L for a Kelvin
-    solid. The load is F_N / (4 G_inf L), in the unit of height.
+    is eta v / (G_inf L), where eta is the viscosity of the dashpot. For a Kelvin solid,
+    the Deborah number is equal to v tau / L. The load is F_N / (4 G_inf L), in the unit of height.
 
     The errors are the absolute discretisation errors of `Steady.columns`, or infinite if the errors are not estimated.
     If a case misses the accuracy even on the finest grid, the results and errors on the finest grid are returned.
