@@ -235,7 +235,7 @@ def _lines(mean: Mean, number: int) -> Mean:
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
     """Return, for each interval, the largest interpolation error of any line, divided by the tolerance of this line.
 
-    The result is minus infinity if every line has a failed case at an end of the interval.
+    If every line has a failed case at one or both ends of the interval, the result is minus infinity.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])

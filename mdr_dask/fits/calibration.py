@@ -161,8 +161,8 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
     """Return possible measurement errors that are about as large as the residuals.
 
-    The first item has equal errors for all points. If all measured values are positive, a second item has errors that
-    are proportional to the predicted values.
+    In the first item, the errors of all points have the same size. If all measured values are
+    positive, a second item has errors that are proportional to the predicted values.
     """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)

@@ -254,8 +254,8 @@ def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[
     """Divide measured values, which scatter about a few set values, into groups; return the group index of each value.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. But close values that alternate within one sweep of the abscissa are
-    rounded readings of one set value, and form one group.
+    each distinct value is a group of its own. Values that are close to each other, and alternate within one sweep of
+    the abscissa, form one group, because they are rounded readings of one set value.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

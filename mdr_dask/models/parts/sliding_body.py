@@ -109,7 +109,7 @@ class SlidingBody(Parameters):
         return self.normal_force
 
     def wavelengths(self) -> tuple[float, float]:
-        """Return the shortest and the longest wavelength of the line in m."""
+        """Return the shortest and the longest wavelength, in m, of the line."""
         if self.surface is not None and self.surface.profile is not None:
             line = line_of(self.surface.profile)
             return 2 * line.length / line.height.size, line.length

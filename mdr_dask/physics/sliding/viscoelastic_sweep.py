@@ -190,7 +190,8 @@ def sweep_line(
 
     `start` contains the stretches e_m at the first node, where the displacement is equal to the penetration. If
     `undeformed` is True, `start` is ignored, and the element enters undeformed and out of contact. `workspace` has the
-    shape (10, max(terms, 1)). Return the number of lengths, and whether the element is in contact at the last node.
+    shape (10, max(terms, 1)). Return the number of entries written to `lengths`, and whether the element is in
+    contact at the last node.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid

@@ -270,7 +270,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _load_instantly(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, bool]:
-    """Apply a load at once to elements without a dashpot. Return the depth, and whether the depth was found."""
+    """Apply a load suddenly to elements without a dashpot. Return the depth, and whether the depth was found."""
     n, mean = under.size, 0.0
     for j in range(n):
         state.free[j] = at_rest(solid, state.terms, j)
