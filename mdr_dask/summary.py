@@ -132,7 +132,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield lines with the number of results, the size and the time of a study in the first round and in all rounds."""
+    """Yield lines about a study: its number of results, its size and its computing time."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"

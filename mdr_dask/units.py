@@ -322,8 +322,6 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
         raise ValueError(f"unknown unit {word!r}{_nearest(word, unit if word == given.strip() else '')}") from None
     except DimensionalityError:
         hint = " (1 kg weighs 9.81 N)" if source == units.kilogram and target == units.newton else ""
-        if wanted == "a pure number" and source.dimensionality == (1 / units.pascal).dimensionality:
-            hint = " (a wear rate in mm^3/(N m) times the hardness is a pure number)"
         for angle in (units.turn, 1 / units.turn) if "[time]" in source.dimensionality else ():
             one = units.Quantity(1.0, source) * angle
             if one.is_compatible_with(target):

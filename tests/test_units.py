@@ -58,7 +58,6 @@ def test_quantities_become_si(written, unit, value):
         ("3 s", "m", r"expected a length \(such as '20 mm'\), got '3 s'"),
         ("5 %", "rad", r"expected an angle \(such as '5 deg'\), got '5 %'"),
         ("5 deg", "1", "expected a pure number, got '5 deg'"),
-        ("1e-5 mm^3/(N m)", "1", r"a pure number \(a wear rate .* times the hardness"),
         ("1 Hz", "rad/s", r"angular frequency .* \(1 Hz is 6.283 rad/s\), got '1 Hz'"),
         ("3 rpm", "Hz", r"\(1 rpm is 0.01667 Hz\)"),
         ("60 HRC", "Pa", "Rockwell hardness is not a pressure"),

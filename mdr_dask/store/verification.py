@@ -40,8 +40,7 @@ class Group:
     """A group of a store during verification: the blocks of the group, and the faults that `repair` removes."""
 
     blocks: Blocks
-    # For each block, and for each attempt to compute the block, the digests of the written chunks by the names of the
-    # arrays.
+    # Digests of the written chunks. The keys are the block, the number of the attempt, and the name of the array.
     attempts: dict[BlockIndex, dict[int, Mapping[str, str]]] = field(default_factory=dict)
     # Blocks with merged records. The ledger must contain these blocks.
     finished: set[BlockIndex] = field(default_factory=set)

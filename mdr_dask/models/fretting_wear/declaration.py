@@ -8,14 +8,13 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts import indenter
 from mdr_dask.models.parts.indenter import RoundedCone
-from mdr_dask.tables import read_table
+from mdr_dask.tables import Read, read_table
 
 
 class Parabola(indenter.Parabola):
@@ -56,25 +55,26 @@ class Table(Parameters):
         from mdr_dask.physics.mdr.revolution import check_table
 
         try:
-            check_table(*profile_columns(file)[:2])
+            table = profile_columns(file)
+            check_table(table["radius"], table["height"])
         except DataError as problem:
             raise ValueError(str(problem)) from None
         except ValueError as problem:
-            raise ValueError(f"{file.name}: {problem}") from None
+            raise ValueError(f"{file.name}: {problem} (lengths in m)") from None
         return file
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note if rows of the table are left out."""
-        missing = profile_columns(self.file)[2]
-        return (f"{self.file.name}: rows without a number are left out: {missing}",) if missing else ()
+        """Return a note on rows and columns of the table that are not used."""
+        remark = profile_columns(self.file).remark
+        return (f"{self.file.name}: {remark}",) if remark else ()
 
 
-def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray, int]:
-    """Return radii and heights of a measured profile, in metres, and the number of incomplete rows."""
+def profile_columns(file: NamedFile) -> Read:
+    """Return the columns radius and height of a measured profile, in metres, without incomplete rows."""
     columns = Column("radius", "m", least=0.0), Column("height", "m", ("f",))
     table = read_table(file.read_text(), file.name, columns, allow_missing=True)
-    known = np.isfinite(table["radius"]) & np.isfinite(table["height"])
-    return table["radius"][known], table["height"][known], int(np.count_nonzero(~known))
+    table.leave_out_incomplete()
+    return table
 
 
 Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]

@@ -178,7 +178,8 @@ def table_profile(indenter: Indenter, depth: float) -> TableProfile:
 def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_table
 
-    return from_table(*profile_columns(file)[:2], depth)
+    table = profile_columns(file)
+    return from_table(table["radius"], table["height"], depth)
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -27,7 +28,7 @@ def points_for(modes: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class _Random:
+class _Random(ABC):
     """Base class of pairs of rough lines with random phases.
 
     `points` is the number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
@@ -53,9 +54,9 @@ class _Random:
             return f"expected a shortest wavelength of at least two point spacings, {least} m, got {wave} m"
         return ""
 
+    @abstractmethod
     def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
         """Return the amplitudes of the waves of line 1 and of line 2."""
-        raise NotImplementedError
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -26,9 +27,9 @@ class Plane(Parameters):
 class _PowerLaw(Parameters):
     """A body of revolution whose height is a power of the distance from its axis."""
 
+    @abstractmethod
     def power_law(self) -> tuple[float, float]:
         """Return coefficient c and exponent n of the body c r^n. If the size of the body is not given, c is NaN."""
-        raise NotImplementedError
 
     def line(self) -> Shape:
         """Return the profile, in m, that replaces the body in the method of dimensionality reduction."""

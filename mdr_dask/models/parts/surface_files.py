@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -63,9 +64,9 @@ class Files(NamedByFile):
         strict=False, min_length=1, description="files of the same surface; each realisation uses one of them"
     )
 
+    @abstractmethod
     def found(self) -> tuple[Found, ...]:
         """Return the spectrum of every file. Raise DataError if a file has no spectrum."""
-        raise NotImplementedError
 
 
 class SpectrumTables(Files):

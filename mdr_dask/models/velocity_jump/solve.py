@@ -6,6 +6,7 @@ solved from the motion of every element of the viscoelastic foundation.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -110,7 +111,7 @@ def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_
 
 
 @dataclass(frozen=True)
-class _Group:
+class _Group(ABC):
     """Cases with the same line, grid and time steps."""
 
     block: Block[VelocityJump]
@@ -131,13 +132,13 @@ class _Group:
         return self.problems.loads[self.members]
 
     @property
+    @abstractmethod
     def operations(self) -> float:
         """Approximate number of operations of one realisation."""
-        raise NotImplementedError
 
+    @abstractmethod
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the cases on one realisation of the roughness. Return the outputs and the number of solved cases."""
-        raise NotImplementedError
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
         """Solve the realisation with the index r in the block and write the results.

@@ -242,8 +242,8 @@ def check_table(radius: FloatArray, height: FloatArray) -> None:
     if np.any(np.diff(height) <= 0.0):
         bad = int(np.argmax(np.diff(height) <= 0.0))
         raise ValueError(
-            f"the profile must rise with the radius, got the height {height[bad + 1]:.4g} m after {height[bad]:.4g} m "
-            f"at the radius {radius[bad + 1]:.4g} m: smooth the profile, or use the parabola that fits it"
+            f"the profile must rise with the radius, got the height {height[bad + 1]:.4g} after {height[bad]:.4g} "
+            f"at the radius {radius[bad + 1]:.4g}: smooth the profile, or use the parabola that fits it"
         )
 
 

@@ -105,8 +105,7 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: float) -> tuple[Any, float]:
-    """Return the contact after one time step by the BDF formula of the highest possible order, and the error of the
-    step.
+    """Take one time step with the BDF formula of the highest possible order. Return the contact and the error.
 
     If the step fails, None is returned instead of the contact.
     """
