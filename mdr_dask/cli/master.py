@@ -1,9 +1,8 @@
-"""The command `master-curve`: merge the curves of a store or a table, or change the reference of a kept curve."""
+"""The command `master-curve`: merge the curves of a store or a table."""
 
 from __future__ import annotations
 
 import contextlib
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 PARTS = ("factors", "curve", "points")
 """Parts of the result that can be printed: shift factors, the merged curve with its error, or all shifted points."""
-
-KEPT = (".json", ".csv")
 
 
 @click.command("master-curve", cls=Reading)
@@ -53,10 +50,7 @@ KEPT = (".json", ".csv")
     help="Value of --by at which the factors are zero, in the unit of --by. It may lie between the measured values.",
 )
 @click.option(
-    "--keep",
-    "-o",
-    type=click.Path(path_type=Path),
-    help="Write the result to FILE.json, which may be a later SOURCE, or the table to FILE.csv.",
+    "--output", "-o", type=click.Path(path_type=Path), help="Write the table to FILE.csv, such as shift factors."
 )
 @figure_options("--plot")
 @click.option("--show", "part", type=click.Choice(PARTS), default=PARTS[0], show_default=True, help="What to print.")
@@ -71,7 +65,7 @@ def master_curve(
     by: str | None,
     vertical: Vertical | None,
     reference: float | None,
-    keep: Path | None,
+    output: Path | None,
     figure: Path | None,
     look: dict[str, Any],
     part: str,
@@ -79,33 +73,21 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print the factors, their errors and fitted laws.
 
-    SOURCE is a store, a table, or a result that --keep has written. A table is a CSV file with a row of names and, if
-    wanted, a row of units; - means standard input. If SOURCE is a result that --keep has written, only the reference
-    can be changed. If the curves differ in both velocity and temperature, there is a shift factor for every velocity
-    and a shift factor for every temperature. The storage and loss modulus of a test are shifted together, unless --of
-    names only one modulus.
+    SOURCE is a store or a table: a CSV file with a row of names and, if wanted, a row of units; - means standard input.
+    The storage and loss modulus of a test are shifted together, unless --of names only one modulus.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
-    mdr-dask master-curve relaxation.csv --by T --reference 20 --keep factors.json
-    mdr-dask master-curve factors.json --reference 60 --show curve --csv
+    mdr-dask master-curve relaxation.csv --by T --reference 20 -o factors.csv
+    mdr-dask master-curve relaxation.csv --by T --reference 60 --show curve --csv
     """
-    require_suffix(keep, KEPT)
+    require_suffix(output, (".csv",))
     from mdr_dask.fits.master_curve import master_curve as superpose
-    from mdr_dask.fits.master_curve import rereferenced
 
-    kept = _kept(source)
-    if kept is None:
-        curve = superpose(_open(source, series, selections), over, ordinates or None, by, vertical, reference)
-    elif vertical or over or ordinates or by or selections or series:
-        raise click.UsageError(
-            f"{source} was written by --keep: only --reference can be changed (for more, give the original table)"
-        )
-    else:
-        curve = kept if reference is None else rereferenced(kept, reference)
-    if keep is not None:
-        with writing(keep):
-            _keep(curve, part, keep)
+    curve = superpose(_open(source, series, selections), over, ordinates or None, by, vertical, reference)
+    if output is not None:
+        with writing(output), output.open("w") as stream, contextlib.redirect_stdout(stream):
+            _print_table(curve, part, "csv")
     if figure is not None:
         from mdr_dask.cli.figures import save
         from mdr_dask.plots.master_curve import draw_master_curve
@@ -113,14 +95,6 @@ def master_curve(
         origin = {"mdr_dask": f"{__version__}, master-curve", "source": source}
         save(lambda: draw_master_curve(curve), figure, origin, look)
     _print(curve, part, form)
-
-
-def _keep(curve: xr.Dataset, part: str, path: Path) -> None:
-    if path.suffix == ".json":
-        path.write_text(json.dumps(curve.to_dict()))
-        return
-    with path.open("w") as stream, contextlib.redirect_stdout(stream):
-        _print_table(curve, part, "csv")
 
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
@@ -156,48 +130,23 @@ def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
     return frame[np.logical_and.reduce(within)]
 
 
-def _kept(source: str) -> xr.Dataset | None:
-    """Return the result in a file that `--keep` wrote, or None if the source is a store or a table."""
-    path = Path(source)
-    if not path.is_file():
-        return None
-    with path.open("rb") as file:
-        if path.suffix != ".json" and file.read(1) != b"{":
-            return None
-    import xarray as xr
-
-    try:
-        curve = xr.Dataset.from_dict(json.loads(path.read_text()))
-    except (ValueError, KeyError, TypeError):
-        curve = xr.Dataset()
-    if "shift_factor" not in curve or "group" not in curve.attrs:
-        raise DataError(f"{path}: this is not a master curve that --keep has written")
-    return curve
-
-
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
-    """Print one part of the result. If the curves differ in two quantities, print two tables of factors."""
     from mdr_dask.fits.collapse import sign_of
     from mdr_dask.fits.curve_tables import is_temperature
 
-    shown = []
-    if part != "factors":
-        dims = (part.removesuffix("s"),)
-        shown = [curve[[name for name in curve.data_vars if curve[name].dims == dims]]]
     if part == "factors":
         kept = ("shift_factor", "vertical_factor") if curve["vertical_factor"].any() else ("shift_factor",)
-        columns = ("", "_error", "_low", "_high")
-        for names in (kept, ("second_factor",)):
-            found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
-            shown.extend([curve[found]] if found else [])
+        shown = curve[[f"{name}{column}" for name in kept for column in ("", "_error", "_low", "_high")]]
         by = str(curve.attrs["group"])
         if form == "csv" and is_temperature(by, curve[by].attrs.get("units", "")):  # `shift_factors` reads this column
-            shown[0] = shown[0].assign({"log10 a_T": sign_of(str(curve.attrs["abscissa"])) * curve["shift_factor"]})
+            shown = shown.assign({"log10 a_T": sign_of(str(curve.attrs["abscissa"])) * curve["shift_factor"]})
+    else:
+        dims = (part.removesuffix("s"),)
+        shown = curve[[name for name in curve.data_vars if curve[name].dims == dims]]
     attrs = ("abscissa", "ordinate", "companion", "group")
     own = {f"{part.removesuffix('s')}_{key}": str(curve.attrs[key]) for key in attrs if curve.attrs.get(key)}
-    for dataset in shown:
-        rows, units = table(dataset.rename({old: new for old, new in own.items() if old in dataset}))
-        print_rows(rows, units, form)
+    rows, units = table(shown.rename({old: new for old, new in own.items() if old in shown}))
+    print_rows(rows, units, form)
 
 
 def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
@@ -206,14 +155,6 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
         return
     by = str(curve.attrs["group"])
     _print_table(curve, part, form or "table")
-    if "second" in curve.attrs:
-        click.echo(
-            f"shift = {by} part + {curve.attrs['second']} part, which is zero at "
-            f"{curve.attrs['second']} = {curve.attrs['second_reference']:.6g}; "
-            f"chi-squared of the sum {curve.attrs['chi_squared']:.3g} per degree of freedom, "
-            f"probability {curve.attrs['probability']:.2g}",
-            err=True,
-        )
     moved = " and ".join(str(curve.attrs[name]) for name in ("ordinate", "companion") if curve.attrs.get(name))
     click.echo(f"shifted: {moved}; {curve.attrs['vertical']}", err=True)
     low, high = (float(curve["curve_abscissa"].attrs[f"measured_{end}"]) for end in ("low", "high"))

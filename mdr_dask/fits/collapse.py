@@ -125,10 +125,8 @@ def _collapse(curve: xr.Dataset) -> str:
 def _collapse_of(curve: xr.Dataset, name: str) -> str:
     x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve[f"point_{name}"].to_numpy())
     off = y - np.interp(x, np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve[f"curve_{name}"].to_numpy()))
-    keys = [curve[key].to_numpy() for key in ("point_group", "point_second") if key in curve]
-    members = [
-        np.all([key == one for key, one in zip(keys, row, strict=True)], axis=0) for row in set(zip(*keys, strict=True))
-    ]
+    group = curve["point_group"].to_numpy()
+    members = [group == one for one in np.unique(group)]
     fewest = min(int(np.sum(places)) for places in members)
     found = [_scatter(x, y, members, degree) for degree in DEGREES if degree + 2 < fewest]
     chance = np.nan

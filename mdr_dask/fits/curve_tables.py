@@ -192,26 +192,22 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
     return "compliance" if all(is_one(each, "compliance", unit="1/Pa") for each in ordinates) else "none"
 
 
-def second_group(frame: pd.DataFrame, used: Sequence[str]) -> str | None:
-    """Return the column of a further velocity or temperature in which the curves differ, or None if no column does.
+def require_one_group(frame: pd.DataFrame, used: Sequence[str]) -> None:
+    """Raise DataError if the curves of a table differ in a further force, velocity or temperature.
 
     In a table of moduli against time or frequency, forces and velocities are readings of the instrument and are
     ignored.
     """
-    found = None
     of_moduli = not any(_is(name, "friction_coefficient") for name in used) and any(
         _is(name, over) for name in used for over in ("frequency", "time")
     )
     for name in ("temperature",) if of_moduli else ("normal_force", "velocity", "temperature"):
         column = column_of(frame, name)
         if column is not None and column not in used and frame[column].nunique() > 1:
-            if found is not None or name == "normal_force":
-                raise DataError(
-                    f"the table varies in {column!r} too: keep one of its values, group by it, or delete the column if "
-                    "it only scatters about one value"
-                )
-            found = column
-    return found
+            raise DataError(
+                f"the table varies in {column!r} too: keep one of its values, group by it, or delete the column if it "
+                "only scatters about one value"
+            )
 
 
 def curves_of(
@@ -227,27 +223,6 @@ def curves_of(
     parts = [labels == label for label in np.unique(labels)]
     centres = np.array([np.median(groups[part]) for part in parts])
     return centres, [(np.log10(rows[part, 0]), np.log10(rows[part, 1:].T)) for part in parts]
-
-
-def pairs_of(
-    frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: tuple[str, str]
-) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the values of both columns `by`, shape (curves, 2), and the points of all curves as in `curves_of`."""
-    labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
-    keys, curves = [], []
-    for pair in sorted(set(map(tuple, labels.T))):
-        part = frame[np.all(pair == labels.T, axis=1)]
-        centre = [
-            float(frame[name].to_numpy()[row == label].mean())
-            for name, row, label in zip(by, labels, pair, strict=True)
-        ]
-        (_,), (curve,) = curves_of(part.assign(**{by[0]: centre[0]}), over, ordinates, by[0])
-        if np.ptp(curve[0]) == 0:
-            where = f"{by[0]} = {centre[0]:g}, {by[1]} = {centre[1]:g}"
-            raise DataError(f"the curve at {where} needs two or more distinct points")
-        keys.append(centre)
-        curves.append(curve)
-    return np.array(keys), curves
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:

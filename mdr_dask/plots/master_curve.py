@@ -27,8 +27,6 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     shifts = [(str(attrs["group"]), "shift_factor", attrs["reference"])]
     if curve["vertical_factor"].any():
         shifts.append((str(attrs["group"]), "vertical_factor", attrs["reference"]))
-    if "second" in attrs:
-        shifts.append((str(attrs["second"]), "second_factor", attrs["second_reference"]))
     panels = [*_curves(curve), *(_factors(curve, *shift) for shift in shifts)]
     fixed = ", ".join(dict.fromkeys(f"{_words(by)} = {_text(value, curve[by])}" for by, _, value in shifts))
     figure = Figure(panels, "master curve", f"reference: {fixed}", "bars and band: 68 %", ratio=0.85)
@@ -38,20 +36,18 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
 
 
 def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
-    by, second = str(curve.attrs["group"]), str(curve.attrs.get("second", ""))
+    by = str(curve.attrs["group"])
     named = {"curve_abscissa": curve.attrs["abscissa"], "point_abscissa": curve.attrs["abscissa"]}
     named |= {
         f"{which}_{channel}": curve.attrs[channel] for channel in _channels(curve) for which in ("curve", "point")
     }
-    named |= {by: by, "point_group": by} | ({second: second, "point_second": second} if second else {})
+    named |= {by: by, "point_group": by}
     how = {name: labels.quantity(str(quantity), curve[name]) for name, quantity in named.items()}
     shown = curve.copy()
     for name, each in how.items():
         ends = {key: each.of(value) for key, value in curve[name].attrs.items() if key.startswith("measured_")}
         shown[name] = (curve[name].dims, each.of(curve[name].values), {**ends, "units": each.unit})
     shown.attrs["reference"] = how[by].of(curve.attrs["reference"])
-    if second:
-        shown.attrs["second_reference"] = how[second].of(curve.attrs["second_reference"])
     return shown
 
 
@@ -86,15 +82,12 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
         name, colour = _text(value, curve[by]), colours.shade(bar, float(value)) if bar else colours.colour(k)
         points = curve.isel(point=np.flatnonzero(curve["point_group"].values == value))
         x = points["point_abscissa"].values
-        shift = points.get("point_shift", curve["shift_factor"][k]).values
-        rise = curve["vertical_factor"][k].values
-        second = points["point_second"].values if "point_second" in points else np.zeros(x.size)
+        shift, rise = curve["shift_factor"][k].values, curve["vertical_factor"][k].values
         for channel, marker in channels.items():
             y = points[f"point_{channel}"].values
             merged.traces.append(Trace("curve", columns(x=x, y=y), label=name, colour=colour, marker=marker))
-            for one in (second == each for each in np.unique(second)):
-                raw = columns(x=(x / 10**shift)[one], y=(y / 10**rise)[one])
-                measured.traces.append(Trace("curve", raw, label=name, colour=colour, line="-", marker=marker))
+            raw = columns(x=x / 10**shift, y=y / 10**rise)
+            measured.traces.append(Trace("curve", raw, label=name, colour=colour, line="-", marker=marker))
         keys.append(Key(name, colour, "", "."))
     merged.traces += [trace for channel in channels for trace in _lines(curve, channel)]
     marks = [Key(name, "#777777", "", mark) for name, mark in zip(names, channels.values(), strict=True)]
