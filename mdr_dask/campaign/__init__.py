@@ -3,16 +3,3 @@
 from mdr_dask.campaign.definition import Axis, Campaign, Refinement, Replication, Series, Spread, Tolerance
 from mdr_dask.campaign.read import load, loads
 from mdr_dask.campaign.schema import json_schema
-
-__all__ = [
-    "Axis",
-    "Campaign",
-    "Refinement",
-    "Replication",
-    "Series",
-    "Spread",
-    "Tolerance",
-    "json_schema",
-    "load",
-    "loads",
-]

@@ -4,5 +4,3 @@ from mdr_dask.execute.events import Event, Progress, Tell
 from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.rounds import outlook, run
 from mdr_dask.store import Part
-
-__all__ = ["Event", "Part", "Progress", "Resources", "Tell", "outlook", "run"]

@@ -2,5 +2,3 @@
 
 from mdr_dask.report.page import page
 from mdr_dask.report.study import Study, read_study
-
-__all__ = ["Study", "page", "read_study"]

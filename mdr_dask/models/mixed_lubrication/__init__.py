@@ -1,5 +1,3 @@
 """Mixed lubrication of two rough rollers, and the breakthrough of the boundary layer (thesis chapter 5)."""
 
 from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication
-
-__all__ = ["MODEL", "MixedLubrication"]
