@@ -175,7 +175,7 @@ def aggregate(
     columns: Words = (),
     units: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Compute statistics of outputs over realisations, like ``mdr-dask aggregate``.
+    """Compute statistics of outputs over realisations, like ``mdr-dask show --statistic``.
 
     Parameters
     ----------

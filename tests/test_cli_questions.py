@@ -1,10 +1,9 @@
-"""``show`` and ``aggregate`` return the same rows in every output format."""
+"""``show`` returns the same rows in every output format."""
 
 import csv
 import io
 import json
 import re
-import sys
 
 import numpy as np
 import pandas as pd
@@ -56,24 +55,17 @@ def test_every_form_holds_the_same_rows(study, expected, tmp_path, capsys):
     document = json.loads(output(capsys, "show", study, *ASKED, "--json").out)
     assert document["units"]["velocity"] == "m/s"
     frames["json"] = pd.DataFrame(document["rows"])
-    lines = output(capsys, "show", study, *ASKED, "--jsonl").out.splitlines()
-    frames["jsonl"] = pd.DataFrame([json.loads(line) for line in lines])
-    for suffix in ("csv", "json", "jsonl", "parquet"):
+    for suffix in ("csv", "json"):
         path = tmp_path / f"rows.{suffix}"
         assert output(capsys, "show", study, *ASKED, "-o", str(path)).out.startswith(
             f"{path}: {len(expected)} rows of "
         )
     assert (tmp_path / "rows.csv").read_text() == output(capsys, "show", study, *ASKED, "--csv").out
     assert json.loads((tmp_path / "rows.json").read_text()) == document
-    assert (tmp_path / "rows.jsonl").read_text().splitlines() == lines
-    frames["parquet"] = pd.read_parquet(tmp_path / "rows.parquet")
     for form, frame in frames.items():
         assert list(frame) == COLUMNS, form
         np.testing.assert_array_equal(frame[COLUMNS[:3]].to_numpy(dtype=float), expected, err_msg=form)
         assert frame["status"].value_counts().to_dict() == {"done": len(frame) - 1, "1 failed": 1}, form
-    import pyarrow.parquet
-
-    assert pyarrow.parquet.read_schema(tmp_path / "rows.parquet").field("velocity").metadata[b"units"] == b"m/s"
 
 
 def test_printed_tables_are_limited_and_count_the_other_rows(study, expected, capsys):
@@ -92,20 +84,14 @@ def test_printed_tables_are_limited_and_count_the_other_rows(study, expected, ca
     assert (none.out, none.err) == ("", "no rows\n")
 
 
-def test_single_results_have_a_status(study, capsys):
+def test_statistics_have_columns_and_single_results_have_a_status(study, capsys):
+    asked = ("--group-by", "normal_force", "--statistic", "interval", "--statistic", "quantile", "--csv")
+    titles = output(capsys, "show", study, "rms_slope", *asked).out.splitlines()[0].split(",")
+    assert {"rms_slope_low", "rms_slope_quantile_0.05", "cases"} <= {*titles}
     out = output(capsys, "show", study, "rms_slope", "--realisations", "--csv").out
     rows = list(csv.DictReader(io.StringIO(out)))
     assert len(rows) == 84
     assert {(row["status"], row["rms_slope"] == "nan") for row in rows} == {("done", False), ("failed", True)}
-
-
-def test_aggregates_are_brief_for_a_reader_and_complete_for_a_program(study, capsys):
-    out = output(capsys, "aggregate", study, "friction_coefficient", "--group-by", "normal_force").out
-    assert re.search(r"standard_\s", out)
-    assert len(rows(out)) == 3
-    assert all("(" in row for row in rows(out))
-    titles = output(capsys, "aggregate", study, "friction_coefficient", "--csv").out.splitlines()[0].split(",")
-    assert {"friction_coefficient_low", "friction_coefficient_quantile_0.05", "friction_coefficient_count"} <= {*titles}
 
 
 def test_labelled_arrays_carry_units_numbers_and_states(study, tmp_path, capsys):
@@ -139,9 +125,8 @@ def test_a_study_with_series_lists_them(tmp_path, capsys):
         SLIDING + "  normal_force: 1 N\n  velocity: 1 m/s\nseries:\n  a: {hurst: [0.3, 0.7]}\n  b: {hurst: [1]}\n",
     )
     store = str(tmp_path / "study.zarr")
-    for command in ("show", "aggregate"):
-        assert main([command, store]) == 2
-        assert capsys.readouterr().err == "expected --series with one of a, b, because this study has series\n"
+    assert main(["show", store]) == 2
+    assert capsys.readouterr().err == "expected --series with one of a, b, because this study has series\n"
     assert len(rows(output(capsys, "show", store, "rms_slope", "--series", "a").out)) == 2
 
 
@@ -178,14 +163,6 @@ def test_an_error_that_is_zero_in_all_rows_is_not_printed(capsys):
     frame = pd.DataFrame({"a_mean": [1.0, 2.0], "a_standard_error": [0.0, 1e-17], "a_grid_error": [0.0, 0.5]})
     print_answer(Table(iter([frame]), dict.fromkeys(frame, "m"), 2, 0), "table", 0, True)
     assert capsys.readouterr().out.split("\n")[0] == "mean +- grid error"
-
-
-def test_without_pyarrow_parquet_is_one_message_and_no_file(study, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    path = tmp_path / "rows.parquet"
-    assert main(["show", study, "-o", str(path)]) == 2
-    assert capsys.readouterr().err == "writing .parquet needs pyarrow: pip install 'mdr_dask[parquet]'\n"
-    assert not path.exists()
 
 
 def test_numbers_of_a_model_are_listed(capsys):

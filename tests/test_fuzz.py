@@ -33,7 +33,7 @@ BASES = [TOY, *(path.read_text() for path in sorted((ROOT / "campaigns").glob("*
 RECORDS = "status/records/*.jsonl"
 #: Commands that read a store, mend it and finish it.
 COMMANDS = [
-    *("status s.zarr", "status s.zarr --failures", "show s.zarr --csv", "verify s.zarr", "aggregate s.zarr"),
+    *("status s.zarr", "status s.zarr --failures", "show s.zarr --csv", "verify s.zarr"),
     *("run a.yaml --quiet --threads 1 --store s.zarr", "verify s.zarr --repair"),
     *("run a.yaml --quiet --threads 1 --store s.zarr", "verify s.zarr"),
 ]
@@ -143,9 +143,12 @@ def test_a_changed_store_is_read_or_refused_and_repaired(toy, whole, name):
                 if name == RECORDS
                 else [json.loads(path.read_text())]
             )
-            for tree in trees:
-                tree.pop("digest", None)
-            path.write_text("".join(json.dumps(changed(tree, steps)) + "\n" for tree in trees))
+            digests = [tree.pop("digest", None) for tree in trees]
+            texts = [changed(tree, steps) for tree in trees]
+            if name == RECORDS:  # a record without digest counts as a record of version 0.1
+                pairs = zip(texts, digests, strict=True)
+                texts = [{**text, "digest": digest} if isinstance(text, dict) else {} for text, digest in pairs]
+            path.write_text("".join(json.dumps(text) + "\n" for text in texts))
             assert faults(*COMMANDS) == []
 
     holds()
@@ -176,18 +179,3 @@ def test_files_that_broke_earlier_versions_are_refused(toy, tmp_path, monkeypatc
     Path(name).write_text(text)
     assert faults(command) == []
     assert main(command.split()) == 2
-
-
-@pytest.mark.parametrize("wrong", [{"place": [[0]]}, {"place": [99, 0, 0]}, {"case": {"a": {}}}, {"status": "lost"}])
-def test_damaged_messages_are_left_out(toy, whole, tmp_path, monkeypatch, capsys, wrong):
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(whole, "s.zarr")
-    (path,) = Path("s.zarr").glob(RECORDS)
-    records = [json.loads(line) for line in path.read_text().splitlines()]
-    for record in records:
-        del record["digest"]
-        for message in record["messages"]:
-            message.update(wrong)
-    path.write_text("".join(json.dumps(record) + "\n" for record in records))
-    assert main(["status", "s.zarr", "--failures"]) == 0
-    assert capsys.readouterr().out == "no failures\n"

@@ -55,7 +55,7 @@ def test_questions_and_figures_take_lists(tmp_path):
     wanted = f"history={HISTORIES['harder']}, {HISTORIES['once']}"
     found = selection.select(store.datasets(url)[""], [wanted])
     assert set(found.history.to_numpy()) == {HISTORIES["harder"], HISTORIES["once"]}
-    assert main(["aggregate", url, "wear_volume", "--group-by", "history", "-o", csv]) == 0
+    assert main(["show", url, "wear_volume", "--group-by", "history", "-o", csv]) == 0
     assert Path(csv).read_text().count("amplitude_factor") == 2
     assert main(["plot", url, "wear_volume", "--over", "history", "-o", figure]) == 0
     assert "cycles" not in store.datasets(url)[""].coords  # a history replaces them

@@ -53,7 +53,7 @@ def test_the_example_of_the_page_goes_through_every_command(example, capsys):
     capsys.readouterr()
     assert main(["run", "pin.yaml"]) == 0
     assert "nothing to do" in capsys.readouterr().out
-    assert main(["aggregate", "results/pin.zarr", "--json"]) == 0
+    assert main(["show", "results/pin.zarr", "--json"]) == 0
     assert "wear_volume_grid_error" in json.loads(capsys.readouterr().out)["rows"][0]
 
 

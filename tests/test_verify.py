@@ -164,7 +164,7 @@ def test_the_metadata_of_strangers_are_refused_before_anything_is_opened(toy, ur
     for name in ("open_group", "open_array", "open"):
         monkeypatch.setattr(zarr, name, opened)
     monkeypatch.setattr("xarray.open_zarr", opened)
-    for command in ("status", "show", "plot", "fit", "aggregate"):
+    for command in ("status", "show", "plot", "fit"):
         assert main([command, url]) == 2
         said = capsys.readouterr().err
         assert "mdr-dask verify" in said

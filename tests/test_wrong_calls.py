@@ -52,10 +52,10 @@ WRONG = [
     ("run small.yaml --scheduler nowhere --store new/deep/x.zarr", "'nowhere'"),
     ("run small.yaml --cluster broken.yaml --store new/x.zarr", "'distributed.LocalCluster'"),
     # files that are written
-    ("aggregate STORE -o means.xls", ".csv, .json", "means.xls"),
+    ("show STORE -o means.xls", ".csv, .json", "means.xls"),
     ("plot STORE velocity -o velocity.bmp", ".png, .pdf or .svg", "'velocity.bmp'"),
     ("plot STORE velocity force -o both.png", "folder", "'both.png'"),
-    ("aggregate STORE -o STORE", "new file", "'STORE'"),
+    ("show STORE -o STORE", "new file", "'STORE'"),
     ("publish STORE -o STORE/x.zip", "outside every store", "'STORE/x.zip'"),
     ("run small.yaml --store STORE --log STORE/x.jsonl", "outside every store"),
     ("init sliding_friction -o small.yaml", "small.yaml", "exists already"),
@@ -136,8 +136,8 @@ def test_a_packed_study_is_to_be_unpacked(folder, tmp_path, capsys):
     assert f"{packed}: a file, expected the folder of a store; unpack it first" in capsys.readouterr().err
 
 
-READING = [(f"{command} damaged.zarr", "friction_coefficient") for command in ("show", "aggregate")]
-READING += [
+READING = [
+    ("show damaged.zarr", "friction_coefficient"),
     ("fit damaged.zarr zone_one", "friction_coefficient"),
     ("plot damaged.zarr velocity", "friction_coefficient"),
 ]
@@ -178,7 +178,7 @@ def test_statistics_replace_older_ones_and_are_no_study(folder, tmp_path, monkey
     monkeypatch.chdir(folder)
     target = str(tmp_path / "new/means.zarr")
     for _ in range(2):
-        assert main(["aggregate", "STORE.zarr", "-o", target]) == 0
+        assert main(["show", "STORE.zarr", "-o", target]) == 0
     capsys.readouterr()
     assert main(["run", "small.yaml", "--store", target]) == 2
     assert "not a study" in capsys.readouterr().err

@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import sys
+import traceback
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable, say
 from mdr_dask.cli.publishing import publish, report
-from mdr_dask.cli.results import aggregate, show, status
+from mdr_dask.cli.results import show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify
@@ -29,25 +30,10 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
-#: Groups of commands in ``--help``. All other commands are listed last.
-GROUPS = {
-    "study": ("check", "run", "status", "verify"),
-    "answers": ("show", "fit", "master-curve", "plot", "report"),
-}
 
 
 class Commands(click.Group):
-    """A group whose help lists its commands by purpose."""
-
-    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write each command of a group with one line of help, and then the names of all other commands."""
-        limit = formatter.width - 20
-        for title, names in GROUPS.items():
-            with formatter.section(title):
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(limit)) for name in names])
-        others = [name for name in sorted(self.commands) if not any(name in names for names in GROUPS.values())]
-        with formatter.section("more"):
-            formatter.write_text(f"{', '.join(others)}; each with --help")
+    """The group of all commands."""
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command. Return 0 if a program such as ``head`` stops reading the output."""
@@ -86,7 +72,6 @@ for command in (
     status,
     verify,
     show,
-    aggregate,
     fit,
     sensitivity,
     law,
@@ -128,7 +113,8 @@ def main(arguments: list[str] | None = None) -> int:
         _discard_output()
         return 2
     except Exception:
-        say(_reported(sys.argv[1:] if arguments is None else arguments), err=True)
+        click.echo(printable(traceback.format_exc()), err=True)
+        say(f"a fault of mdr_dask {__version__}; finished results are kept; please report the lines above", err=True)
         return BROKE
     return result if isinstance(result, int) else 0
 
@@ -147,26 +133,6 @@ def _discard_output() -> None:
     """Discard the rest of the output, so that Python exits without another error."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _reported(arguments: list[str]) -> str:
-    """Write the details of an unexpected error to a file, and return the message for the user."""
-    import platform
-    import tempfile
-    import traceback
-    from importlib.metadata import version
-
-    names = ("numpy", "scipy", "numba", "dask", "distributed", "zarr", "xarray")
-    lines = [f"mdr-dask {' '.join(arguments)}", f"mdr_dask {__version__}, Python {platform.python_version()}"]
-    lines += [platform.platform(), ", ".join(f"{name} {version(name)}" for name in names), "", traceback.format_exc()]
-    descriptor, path = tempfile.mkstemp(prefix="mdr-dask-", suffix=".txt", text=True)
-    with os.fdopen(descriptor, "w") as report:
-        report.write("\n".join(lines))
-    last = traceback.format_exc().strip().splitlines()[-1]
-    return (
-        f"a fault of mdr-dask itself: {printable(last)} (finished results are kept; please report the fault "
-        f"with {path})"
-    )
 
 
 def _interrupt(*_: object) -> None:

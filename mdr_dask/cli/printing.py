@@ -56,7 +56,7 @@ def _filled(line: str) -> str:
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
     """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units."""
     if form == "json":
-        print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
+        print_json({"units": units, "rows": [{key: finite(value) for key, value in row.items()} for row in rows]})
         return
     names = list(rows[0]) if rows else list(units)
     titles = [titled(name, units.get(name, "1")) for name in names]
@@ -263,7 +263,8 @@ def short(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return a value for JSON: None instead of a number that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -1,4 +1,4 @@
-"""Commands that read a store: status, show, aggregate."""
+"""Commands that read a store: status and show."""
 
 from __future__ import annotations
 
@@ -10,10 +10,15 @@ import click
 
 from mdr_dask.cli.answers import check_target, print_answer, write_answer
 from mdr_dask.cli.options import (
+    csv_option,
     json_option,
+    limit_option,
     listed,
-    question_options,
+    select_option,
+    series_option,
     tell,
+    units_option,
+    where_option,
 )
 from mdr_dask.cli.printing import print_json, print_rows, say
 from mdr_dask.cli.writing import writing
@@ -89,8 +94,50 @@ def _print_counts(study: dict[str, Any], rows: list[dict[str, Any]], at_work: li
     "--statistic", type=click.Choice(STATISTICS), multiple=True, help="Statistic over realisations; may be repeated."
 )
 @click.option("--realisations", "raw", is_flag=True, help="Show single realisations.")
-@question_options
-def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: bool, **asked: Any) -> None:
+@series_option
+@select_option
+@where_option
+@click.option(
+    "--group-by",
+    multiple=True,
+    callback=listed,
+    metavar="AXIS,...",
+    help="One row for each combination of values of these axes, averaged over all other axes.",
+)
+@click.option(
+    "--sort",
+    multiple=True,
+    metavar="[-]COLUMN",
+    help="Sort the rows by this column; -COLUMN puts the largest value first. May be repeated.",
+)
+@click.option(
+    "--columns",
+    multiple=True,
+    callback=listed,
+    metavar="NAME,...",
+    help="Show only these columns: axes, parameters, outputs, dimensionless numbers, realisations, status.",
+)
+@units_option
+@limit_option
+@json_option
+@csv_option
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    help="Write a table to FILE.csv or .json, or labelled arrays to FILE.nc or .zarr.",
+)
+def show(
+    store: str,
+    outputs: tuple[str, ...],
+    statistic: tuple[str, ...],
+    raw: bool,
+    series: str | None,
+    form: str | None,
+    output: Path | None,
+    limit: int,
+    **parts: Any,
+) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
     A mean is followed by the standard error of the realisations and the discretisation error. The column `status` is
@@ -101,46 +148,8 @@ def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: 
     mdr-dask show results/quickstart.zarr friction_coefficient
     mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s..1 m/s' --units velocity=km/h --csv
     mdr-dask show results/quickstart.zarr --where 'friction_coefficient > 0.01 and velocity < 3 km/h' --sort -velocity
-    mdr-dask show results/quickstart.zarr --columns load_number,velocity_number,scaled_friction -o numbers.parquet
+    mdr-dask show results/quickstart.zarr --columns load_number,velocity_number,scaled_friction -o numbers.csv
     """
-    statistics = None if raw else statistic or ("mean", "standard_error", "grid_error")
-    _answer(store, outputs, statistics, join=not (raw or statistic), **asked)
-
-
-@click.command(cls=Reading)
-@store_argument
-@click.argument("outputs", nargs=-1, callback=listed)
-@click.option(
-    "--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these statistics; may be repeated."
-)
-@question_options
-def aggregate(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], **asked: Any) -> None:
-    """Reduce outputs over realisations: mean, scatter, standard error, quantiles, bootstrap interval.
-
-    Without --statistic, the printed table contains mean, standard deviation and interval; a file contains all
-    statistics.
-
-    \b
-    mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
-    mdr-dask aggregate results/quickstart.zarr friction_coefficient --group-by normal_force
-    """
-    brief = ("mean", "standard_deviation", "interval")
-    wanted = statistic or (STATISTICS if asked["form"] or asked["output"] else brief)
-    _answer(store, outputs, wanted, join=not statistic, **asked)
-
-
-def _answer(
-    store: str,
-    outputs: tuple[str, ...],
-    statistics: tuple[str, ...] | None,
-    join: bool,
-    *,
-    series: str | None,
-    form: str | None,
-    output: Path | None,
-    limit: int,
-    **parts: Any,
-) -> None:
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
     from mdr_dask.questions.labelled import labelled
@@ -150,6 +159,8 @@ def _answer(
         if form:
             raise click.UsageError(f"expected one of --{form} and --output, got both")
         check_target(output)
+    statistics = None if raw else statistic or ("mean", "standard_error", "grid_error")
+    join = not (raw or statistic)
     question = Question(outputs, statistics=statistics, written=output is None and not form, **parts)
     dataset = selection.group(stores.datasets(store), series)
     if output is None:

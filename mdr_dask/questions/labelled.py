@@ -29,7 +29,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     The values of cases that do not meet the condition are NaN.
     """
     if question.sort:
-        raise DataError("expected a table (.csv, .jsonl or .parquet) with --sort, got labelled arrays")
+        raise DataError("expected a table (.csv or .json) with --sort, got labelled arrays")
     columns = [name for name in question.columns if name not in dataset.coords]
     shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)], tell)
     used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])

@@ -10,7 +10,7 @@ import logging
 import re
 import uuid
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -43,23 +43,7 @@ def name_of(series: str, index: BlockIndex, attempt: int) -> str:
 def decoded(line: bytes) -> dict[str, Any] | None:
     """Return a record, or None for a damaged record. Records of version 0.1 have no digest and count as undamaged."""
     record = without_digest(line)
-    try:
-        return record if record is not None and _is_one(record) else None
-    except (TypeError, KeyError, AttributeError):
-        return None
-
-
-def _is_one(found: Mapping[str, Any]) -> bool:
-    """Return whether a JSON document has the keys and types of a record."""
-    whole = type(found["attempt"]) is int and all(type(i) is int and i >= 0 for i in found["block"])
-    texts = all(type(one) is str for one in found.get("chunks", {}).values()) and type(found.get("kind", "")) is str
-    return whole and texts and type(found["messages"]) is list and all(map(_is_message, found["messages"]))
-
-
-def _is_message(message: Mapping[str, Any]) -> bool:
-    texts = type(message["message"]) is str and message["status"] in ("done", "not_converged", "failed", "not_needed")
-    plain = all(isinstance(value, str | int | float | None) for value in message["case"].values())
-    return texts and plain and all(type(i) is int and i >= 0 for i in message.get("place", ()))
+    return record if record is not None and record.keys() >= {"block", "attempt", "messages"} else None
 
 
 def lines(url: str, series: str) -> Iterator[tuple[str, bytes]]:
