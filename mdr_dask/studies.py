@@ -276,7 +276,7 @@ def plot(
     select: Words = (),
     *,
     where: str = "",
-    over: Words | None = None,
+    over: Words = (),
     by: str = "",
     panels: str = "",
     log: str | None = None,
@@ -295,8 +295,7 @@ def plot(
     figure : str
         Name of a figure or of an output.
     over : sequence of str, optional
-        One axis for curves of an output, two axes for a map, or empty for main effects. The default is the axis with
-        the most values.
+        One axis for curves of an output, or two axes for a map. The default is the axis with the most values.
     select, where, by, panels, log, measured, units, size, title, style
         As the options of the command. `measured` may also be a DataFrame, with units in brackets after the column
         names.
@@ -314,7 +313,7 @@ def plot(
     groups = _groups(study)
     model = _model(groups)
     known = plots.available(model)
-    of_output = over is not None or by or panels or log is not None
+    of_output = over or by or panels or log is not None
     if of_output or (figure not in known and any(figure in data.data_vars for data in groups.values())):
         from mdr_dask.plots.view import figure_of
 

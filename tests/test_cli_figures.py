@@ -41,7 +41,7 @@ def test_selected_values_are_stated(filled, capsys):
     assert all(part in printed for part in ("F_N = 0.1 N", "relaxation_time = 0.001 s", "95 % intervals"))
     assert "held fixed: " in Path("one.csv").read_text()
     assert "normal_force = 0.1 N" in Path("one.csv").read_text()
-    map_of = ["plot", filled, "friction_coefficient", "--effects", "--title", "Mine", "-o", "two.png"]
+    map_of = ["plot", filled, "friction_coefficient", "--over", "normal_force", "--title", "Mine", "-o", "two.png"]
     assert main([*map_of, "--select", "velocity=1 m/s"]) == 0
     assert "v = 1 m/s" in capsys.readouterr().err
     assert main(["plot", filled, "velocity", "--select", "normal_farce=1"]) == 2
@@ -95,8 +95,8 @@ def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, c
 
 def test_several_figures_and_parts_of_a_study_are_drawn(filled, capsys):
     assert main(["plot", filled, filled, "contact_fraction", "--over", "velocity", "--over", "normal_force"]) == 0
-    assert main(["plot", filled, "friction_coefficient", "rms_slope", "--effects", "-o", "drawn"]) == 0
-    assert (Path("drawn") / "small-rms_slope-effects.csv").exists()
+    assert main(["plot", filled, "friction_coefficient", "rms_slope", "--over", "velocity", "-o", "drawn"]) == 0
+    assert (Path("drawn") / "small-rms_slope-over-velocity.csv").exists()
     assert main(["plot", filled, "velocity", "--where", "friction_coefficient < 1e-4", "-o", "drawn/slow.png"]) == 0
     assert "not drawn: cases other than friction_coefficient < 1e-4" in capsys.readouterr().err
     slow = pd.read_csv("drawn/slow.csv", comment="#")

@@ -18,7 +18,7 @@ WRONG = [
     ("run small.yaml --part 4/3", "K/N", "'4/3'"),
     ("show STORE -o x.csv --json", "--json and --output"),
     ("show STORE -o x.nc --sort velocity", ".csv", "--sort"),
-    ("plot STORE friction_coefficient --over velocity --effects", "--over once", "--effects"),
+    ("plot STORE friction_coefficient --over a --over b --over c", "--over once"),
     ("plot STORE friction_coefficient --over velocity --log q", "x, y and z", "'q'"),
     ("plot STORE friction_coefficient --over velocity --size 85", "'85mm'"),
     # names

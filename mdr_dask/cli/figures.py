@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mdr_dask.plots.figure import Figure
 
 #: Options that apply only to figures of outputs, because the axes of a named figure are fixed.
-OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
+OF_OUTPUTS = ("over", "by", "panels", "log")
 COMMAND = "mdr_dask.command"
 
 
@@ -41,7 +41,6 @@ class Drawing(click.Command):
 @click.option("--over", multiple=True, metavar="AXIS", help="Draw an output against this axis; twice for a map.")
 @click.option("--by", default="", metavar="AXIS", help="Axis or sampled parameter that the colours show.")
 @click.option("--panels", default="", metavar="AXIS", help="One panel for each value of this axis.")
-@click.option("--effects", is_flag=True, help="Draw the mean of an output against each varied parameter.")
 @click.option("--series", multiple=True, help="Draw only this series; may be repeated.")
 @select_option
 @where_option
@@ -75,7 +74,7 @@ def plot(
 ) -> None:
     """Draw figures by name, or any output against any axis; without a name, list figures, outputs and axes.
 
-    Without --over and --effects, an output is drawn against the axis with the most values. The data of every figure
+    Without --over, an output is drawn against the axis with the most values. The data of every figure
     are written to the table FIGURE.csv next to the figure. If a study has more axes than a figure can show, each
     further axis is fixed at one value, which is printed. Choose another value with --select. Several stores can be
     drawn in one figure.
@@ -207,7 +206,7 @@ def _requested(
     require_known(
         of_outputs, outputs if given else [*known, *outputs], "output" if given else "store, figure or output"
     )
-    ending = f"-over-{'-'.join(axes['over'])}" if axes["over"] else "-effects" if axes["effects"] else ""
+    ending = f"-over-{'-'.join(axes['over'])}" if axes["over"] else ""
     return {
         f"{name}{ending}" if name in of_outputs else name: _of_output(name, groups, axes)
         if name in of_outputs
@@ -220,13 +219,13 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
     from mdr_dask.plots.view import figure_of
 
     over = tuple(axis.replace(".", "_") for axis in axes["over"])
-    if len(over) > 2 or (over and axes["effects"]):
-        raise click.UsageError("expected --over once, --over twice (for a map), or --effects")
+    if len(over) > 2:
+        raise click.UsageError("expected --over once, or --over twice (for a map)")
     log = axes["log"]
     if log is not None and log != "none" and not set(log) <= set("xyz"):
         raise click.UsageError(f"expected --log with one or more of the letters x, y and z, or 'none', got {log!r}")
     by, panels = (axes[key].replace(".", "_") for key in ("by", "panels"))
-    return figure_of(groups, name, over if over or axes["effects"] else None, by, panels, "" if log == "none" else log)
+    return figure_of(groups, name, over, by, panels, "" if log == "none" else log)
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:

@@ -27,20 +27,19 @@ class Curve(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Curves against one parameter, with the entries of the legend.
+    """Curves against one parameter. `left_out` are texts about the values that are not drawn.
 
-    `bar` is a colour bar if the curves need more colours than there are, otherwise None. `held` are the parameters that
-    have the same value in all curves. `left_out` are texts about the values that are not drawn. `varying` are
-    parameters that change from point to point in a sampled study. Neither the axis nor the colours show these
-    parameters.
+    `bar` is a colour bar if the curves need more colours than there are, otherwise None.
     """
 
     curves: list[Curve]
-    keys: list[Key]
     bar: Bar | None
-    held: dict[str, xr.DataArray]
     left_out: list[str]
-    varying: tuple[str, ...] = ()
+
+    @property
+    def keys(self) -> list[Key]:
+        """The entries of the legend. A colour bar replaces the legend."""
+        return [] if self.bar else [Key(c.label, c.colour, c.line, c.marker) for c in self.curves if c.label]
 
 
 def mean(data: xr.Dataset, output: str) -> Mean:
@@ -118,35 +117,40 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
     """Split a series into curves against the parameter `along`.
 
     The curves differ in the parameter `by`. Without `by`, there is a curve for every combination of values of the other
-    axes. If there would be more curves than colours, colours show the values of one axis. Line styles show the values
-    of a second axis with few values. Every other axis is fixed at the middle value. If the axis shown by colours has
-    more values than there are colours, a colour bar shows numbers, and some words are left out. The label of each curve
-    begins with the name `series`. The first curve gets the colour with the index `first`.
+    axes, or for every value of the longest of these axes if there would be more curves than colours. Every other axis
+    is fixed at the middle value. If the curves differ in one axis with more values than there are colours, a colour bar
+    shows numbers, and some words are left out. The label of each curve begins with the name `series`. The first curve
+    gets the colour with the index `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
     over = along_dim(data, along, output)
     others = [dim for dim in axes_of(data, output) if dim != over and data.sizes[dim] > 1]
-    colour = along_dim(data, by, output) if by else None
-    if colour == over:
-        colour = None
     if by:
-        kept = [colour] if colour else []
-    elif int(np.prod([data.sizes[dim] for dim in others], dtype=int)) <= colours.most():
-        kept = others
-    else:
-        kept = _most_shown(data, others)
-    rest = [dim for dim in axes_of(data, output) if dim != over and dim not in kept]
-    data, left_out = hold(data, rest)
-    for dim in kept:
-        if data.sizes[dim] > colours.most() and not _is_numeric(data, dim):
-            data, more = thin(data, dim, colours.most())
-            left_out += more
-    together = parameters_along(data, over) if over else [along]
-    joined = over is not None and len(together) == 1 and data.sizes[over] > 1
-    curves, keys, bar = _split(data, kept, joined, series, first)
-    varying = tuple(name for name in together if name not in (along, by))
-    return Family(curves, keys, bar, scalars(data), left_out, varying)
+        others = [dim for dim in [along_dim(data, by, output)] if dim not in (None, over)]
+    elif int(np.prod([data.sizes[dim] for dim in others], dtype=int)) > colours.most():
+        others = [max(others, key=lambda dim: data.sizes[dim])]
+    data, left_out = hold(data, [dim for dim in axes_of(data, output) if dim not in (over, *others)])
+    for dim in (dim for dim in others if not _is_numeric(data, dim)):
+        data, more = thin(data, dim, colours.most())
+        left_out += more
+    cells = [dict(zip(others, cell, strict=True)) for cell in np.ndindex(*(data.sizes[dim] for dim in others))]
+    parts = [needed(data.isel(cell)) for cell in cells]
+    named = [", ".join([series] * bool(series) + _names(part, others)) for part in parts]
+    joined = over is not None and len(parameters_along(data, over)) == 1 and data.sizes[over] > 1
+    looks = [(colours.colour(k), *colours.line_and_marker(k)) for k in range(first, first + len(parts))]
+    bar = None
+    if len(parts) > colours.most():
+        name = parameters_along(data, others[0])[0]
+        values = labels.shown(name, data[name])
+        bar = colours.bar(labels.label(name, data[name]), values)
+        # small markers, because there are many curves
+        looks = [(colours.shade(bar, value), "-", "." if joined else "o") for value in values]
+    curves = [
+        Curve(part, label, colour, line if joined else "", marker)
+        for part, label, (colour, line, marker) in zip(parts, named, looks, strict=True)
+    ]
+    return Family(curves, bar, left_out)
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
@@ -161,59 +165,9 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
     ] if rest else []
 
 
-def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Choose the axis shown by colours, and possibly a second axis shown by line styles.
-
-    The choice shows as many curves as possible.
-    """
-    few = len(colours.LINES)
-    pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
-    choices = [*([dim] for dim in others), *pairs]
-    return max(choices, key=lambda dims: np.prod([data.sizes[dim] for dim in dims]))
-
-
 def _is_numeric(data: xr.Dataset, dim: str) -> bool:
     name = parameters_along(data, dim)[0]
     return name in data.coords and data[name].dtype.kind in "fiu"
-
-
-def _split(
-    data: xr.Dataset, dims: list[str], joined: bool, series: str, start: int
-) -> tuple[list[Curve], list[Key], Bar | None]:
-    """Return one curve for each combination of values of some axes, the entries of the legend, and the colour bar."""
-    cells = list(np.ndindex(*(data.sizes[dim] for dim in dims)))
-    parts = [needed(data.isel(dict(zip(dims, cell, strict=True)))) for cell in cells]
-    named = [", ".join(([series] if series else []) + _names(part, dims)) for part in parts]
-    if len(cells) <= colours.most():
-        looks = [(colours.colour(k), *colours.line_and_marker(k)) for k in range(start, start + len(cells))]
-        curves = [
-            Curve(part, label, colour, line if joined else "", marker)
-            for part, label, (colour, line, marker) in zip(parts, named, looks, strict=True)
-        ]
-        return curves, [Key(c.label, c.colour, c.line, c.marker) for c in curves if c.label], None
-    first, second = dims[0], dims[1] if len(dims) > 1 else None
-    name = parameters_along(data, first)[0]
-    bar = None
-    if data.sizes[first] > colours.most():
-        bar = colours.bar(labels.label(name, data[name]), labels.shown(name, data[name]))
-        shades = [colours.shade(bar, value) for value in labels.shown(name, data[name])]
-    else:
-        shades = [colours.colour(k) for k in range(data.sizes[first])]
-    curves = []
-    for part, label, cell in zip(parts, named, cells, strict=True):
-        k = cell[1] if second else 0
-        marker = "." if bar and joined else colours.MARKERS[k]  # small markers, because there are many curves
-        curves.append(Curve(part, label, shades[cell[0]], colours.LINES[k] if joined else "", marker))
-    keys = []
-    if bar is None:
-        for k in range(data.sizes[first]):
-            text = ", ".join(_names(data.isel({first: k}), [first]))
-            keys.append(Key(text, shades[k], "-" if joined else "", "" if joined else "o"))
-    if second:
-        for k in range(data.sizes[second]):
-            text = ", ".join(_names(data.isel({second: k}), [second]))
-            keys.append(Key(text, "#404040", colours.LINES[k] if joined else "", colours.MARKERS[k]))
-    return curves, keys, bar
 
 
 def needed(curve: xr.Dataset) -> xr.Dataset:
@@ -247,8 +201,9 @@ def _given(data: xr.Dataset, name: str) -> list[Any]:
     return list(np.ravel(data[name].values)) if name in data.coords else [parameters_of(data).get(name)]
 
 
-def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.DataArray]:
-    """Return the parameters that have the same value in all families."""
+def fixed_by_all(parts: Iterable[xr.Dataset]) -> dict[str, xr.DataArray]:
+    """Return the parameters that have a single value, the same value in all parts of a study."""
+    held = [scalars(part) for part in parts]
     first = held[0] if held else {}
     return {
         name: value

@@ -44,7 +44,7 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     shown = [0, *(k for k in (1, 2) if any(_changes(column[k]) for column in columns_of.values()))]
     panels = [column[k] for column in columns_of.values() for k in shown]
     figure = Figure(panels, "friction along histories of velocity and load", stack=len(shown), ratio=0.45)
-    held = curves.fixed_by_all([families[name].held for name in kept])
+    held = curves.fixed_by_all(curve.data for name in kept for curve in families[name].curves)
     figure.fixed = curves.fixed_text(held, found[kept[0]])
     figure.bars = curves.meaning_of_bars(found.values(), [FRICTION])
     figure.leave_out([*left_out, f"series {', '.join(rest)}" if rest else ""])

@@ -43,8 +43,8 @@ FIGURES: dict[str, dict[str, tuple[str, *tuple[View, ...]]]] = {
             View(("upper_profile", "lower_profile"), "position", single=True),
         ),
         "trace": (
-            "contact length during one revolution, one panel for each case",
-            View("contact_length_trace", "angle", log="", single=True, apart=True),
+            "contact length during one revolution",
+            View("contact_length_trace", "angle", log="", single=True),
         ),
     },
     "ehl_line": {

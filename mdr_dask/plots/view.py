@@ -1,14 +1,11 @@
-"""Figures of any output of any model against parameters: curves, maps and main effects.
-
-A main effect is the mean of an output against one parameter, averaged over all other parameters.
-"""
+"""Figures of any output of any model against parameters: curves and maps."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,8 +19,6 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
 #: `MOST_PANELS`: largest number of panels for one output. `LONGEST_WORD`: most characters in a line of text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: In a figure of main effects: largest number of parameters, and largest number of cases that are drawn as points.
-MOST_EFFECTS, MOST_POINTS = 12, 5000
 #: `MARKS`: marks for cases without a value. `SOME`: mark for a case with failed realisations, because the mean may then
 #: be biased.
 MARKS = {
@@ -32,28 +27,29 @@ MARKS = {
     Status.MISSING: ("1", "missing"),
 }
 SOME = "v", "mean without realisations that failed"
+Series = Mapping[str, xr.Dataset]
+#: The title of a panel, and the series in the panel.
+Part = tuple[str, dict[str, xr.Dataset]]
 
 
 @dataclass(frozen=True)
 class View:
     """The description of a figure of outputs. Several outputs are drawn one above the other.
 
-    `over` is the parameter on the horizontal axis. With two parameters, the figure is a map. With no parameter, the
-    figure shows the main effects of all parameters. Colours show the values of the parameter `by`. There is one panel
-    for each value of the parameter `panels`. `log` contains the letters of the logarithmic axes (x, y, and z for
-    colours). If `log` is None, an axis is logarithmic if the numbers are positive and span more than a factor of ten.
-    An output that is a pure number then has a linear axis. For an output against its own dimension, such as a profile,
-    both axes are then linear. If `single` is true, the first realisation is drawn instead of the mean. If `apart` is
-    true, every curve has its own panel. `guides` contains the positions and names of horizontal lines for each output.
+    `over` is the parameter on the horizontal axis. With two parameters, the figure is a map. Colours show the values of
+    the parameter `by`. There is one panel for each value of the parameter `panels`. `log` contains the letters of the
+    logarithmic axes (x, y, and z for colours). If `log` is None, an axis is logarithmic if the numbers are positive and
+    span more than a factor of ten. An output that is a pure number then has a linear axis. For an output against its
+    own dimension, such as a profile, both axes are then linear. If `single` is true, the first realisation is drawn
+    instead of the mean. `guides` contains the positions and names of horizontal lines for each output.
     """
 
     outputs: str | tuple[str, ...]
-    over: str | Sequence[str] = ()
+    over: str | Sequence[str]
     by: str = ""
     panels: str = ""
     log: str | None = None
     single: bool = False
-    apart: bool = False
     guides: Mapping[str, Mapping[float, str]] = field(default_factory=dict)
 
     @property
@@ -75,16 +71,13 @@ class View:
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
     """Return the parameter that has the most values among the parameters with which an output varies. If the output has
-    its own dimension, such as time, return this dimension instead. In a sampled study, return an empty tuple: the
-    figure then shows main effects.
+    its own dimension, such as time, return this dimension instead.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
         own = _own_dims(data, output)
         if own:
             return (own[0],)
-        if any(_is_sampled(data, dim) for dim in curves.axes_of(data, output)):
-            return ()
         found |= {name: max(found.get(name, 0), data[name].size) for name in varied(data, output)}
     left = [name for name in found if name not in without]
     return (max(left, key=lambda name: found[name]),) if left else ()
@@ -95,24 +88,17 @@ def _own_dims(data: xr.Dataset, output: str) -> list[str]:
     return [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
 
 
-class _Part(NamedTuple):
-    """The title of one panel, and the series in this panel, indexed by name."""
-
-    title: str
-    series: dict[str, xr.Dataset]
-
-
 def figure_of(
     groups: Mapping[str, xr.Dataset],
     output: str,
-    over: str | Sequence[str] | None = None,
+    over: str | Sequence[str] = (),
     by: str = "",
     panels: str = "",
     log: str | None = None,
 ) -> Plot:
-    """Return the figure of an output. If `over` is None, `main_axis` replaces it. `View` explains the arguments."""
-    view = View(output, main_axis(groups, output, (by, panels)) if over is None else over, by, panels, log)
-    summary = f"{output} against {' and '.join(view.along) or 'every parameter that varies'}".replace("_", " ")
+    """Return the figure of an output. If `over` is empty, `main_axis` replaces it. `View` explains the arguments."""
+    view = View(output, over or main_axis(groups, output, (by, panels)), by, panels, log)
+    summary = f"{output} against {' and '.join(view.along)}".replace("_", " ")
     return Plot(output, (), summary, lambda groups: draw(groups, view))
 
 
@@ -134,8 +120,9 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
             most = max(data.sizes.get("realisation", 1) for data in found.values())
             reasons += [f"all realisations except the first of {most}"] * (most > 1)
             found = {name: data.isel(realisation=[0]) for name, data in found.items()}
-        form = {0: _effects, 1: _lines, 2: _map}[len(view.along)]
-        figures.append(form(found, view, output))
+        if not view.along:
+            raise DataError(f"expected an output that varies with a parameter, got {output}")
+        figures.append((_lines if len(view.along) == 1 else _map)(found, view, output))
         shown.append((view, output, found))
     drawn = {output for _, output, _ in shown}
     reasons += [reason for output, why in missing.items() if output not in drawn for reason in why]
@@ -213,7 +200,7 @@ def _is_sampled(data: xr.Dataset, dim: str | None) -> bool:
 
 def _subject(view: View, output: str, found: Mapping[str, xr.Dataset], more: int) -> str:
     several = f" and {more} more output{'s' * (more > 1)}" if more else ""
-    along = " and ".join(name.replace("_", " ") for name in view.along) or "every parameter that varies"
+    along = " and ".join(view.along).replace("_", " ")
     series = f", series {next(iter(found))}" if len(found) == 1 and next(iter(found)) else ""
     return f"{labels.quantity(output, next(iter(found.values()))[output]).symbol}{several} against {along}{series}"
 
@@ -253,10 +240,9 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     along = view.along[0]
     if view.log is None and any(along in _own_dims(data, output) for data in found.values()):
         view = replace(view, log="")
-    parts, left_out = _parts(found, view, output)
+    parts, left_out = _divided(found, view, output)
     x = _axis(along, [data[along] for data in found.values()], view, "x")
-    families = [_families(part.series, view, output) for part in parts]
-    panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
+    panels = [_panel(title, families, view, output, x) for title, families in parts]
     first = next(iter(found.values()))
     drawn = [trace.column("y") for panel in panels for trace in panel.traces if trace.what == "data"]
     values = np.concatenate(drawn)
@@ -264,12 +250,13 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     for panel in panels:
         panel.y = y
         panel.traces += _guides(view.guides.get(output, {}), panel)
-    every = [one for part in families for one in part.values()]
-    figure = Figure(panels, "", share_y=len(panels) > 1, ratio=0.3 if view.apart else 0.7)
-    figure.states = [curve.data["status"] for one in every for curve in one.curves if "status" in curve.data]
-    figure.fixed = curves.fixed_text(curves.fixed_by_all([one.held for one in every]), first)
+    families = [one for _, each in parts for one in each]
+    every = [curve.data for one in families for curve in one.curves]
+    figure = Figure(panels, "", share_y=len(panels) > 1)
+    figure.states = [data["status"] for data in every if "status" in data]
+    figure.fixed = curves.fixed_text(curves.fixed_by_all(every), first)
     figure.bars = curves.meaning_of_bars(found.values(), [output])
-    figure.leave_out([*left_out, *(sentence for one in every for sentence in one.left_out)])
+    figure.leave_out([*left_out, *(sentence for one in families for sentence in one.left_out)])
     return figure
 
 
@@ -286,56 +273,72 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
     return found
 
 
-def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
-    """Divide the curves of a figure into panels. Also return texts about what is left out.
+def _divided(found: Series, view: View, output: str) -> tuple[list[tuple[str, list[curves.Family]]], list[str]]:
+    """Return the title and the curves of each panel, and texts about what is left out.
 
-    With `View.panels`, each value of this parameter has a panel. With `View.apart`, each curve has a panel. Otherwise
-    there is one panel, or one panel for each series if a common panel would have more curves than colours.
+    With `View.panels`, each value of this parameter has a panel. Otherwise there is one panel, or one panel for each
+    series if a common panel would have more curves than colours.
     """
     if view.panels:
-        return _by_value(found, view)
-    families = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
-    if view.apart:
-        every = [(name, curve) for name, one in families.items() for curve in one.curves]
-        rest = [f"{len(every) - MOST_PANELS} of {len(every)} curves"] if len(every) > MOST_PANELS else []
-        left_out = [sentence for one in families.values() for sentence in one.left_out]
-        titles = [", ".join(part for part in (name, curve.label) if part) for name, curve in every]
-        parts = [_Part(title, {name: curve.data}) for title, (name, curve) in zip(titles, every, strict=True)]
-        return parts[:MOST_PANELS], [*left_out, *rest]
-    if len(found) == 1 or sum(len(one.curves) for one in families.values()) <= colours.most():
-        return [_Part("", dict(found))], []
-    kept, left_out = curves.with_one_legend(families)
-    parts, more = _by_series({name: found[name] for name in kept})
-    return parts, [*left_out, *more]
+        parts, left_out = _by_value(found, view)
+    else:
+        together = _together(found, view, output)
+        if together is not None:
+            return [("", together)], []
+        alone = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
+        kept, left_out = curves.with_one_legend(alone)
+        parts, more = _by_series({name: found[name] for name in kept})
+        left_out += more
+    panels = []
+    for title, series in parts:
+        families = _together(series, view, output)
+        if families is None:
+            raise DataError(
+                f"expected at most {colours.most()} curves of several series in a panel, got more: "
+                "select fewer curves, or leave out 'panels'"
+            )
+        panels.append((title, families))
+    return panels, left_out
 
 
-def _by_value(found: Mapping[str, xr.Dataset], view: View) -> tuple[list[_Part], list[str]]:
-    parts: dict[Any, _Part] = {}
+def _together(series: Series, view: View, output: str) -> list[curves.Family] | None:
+    """Return the curves of several series in one panel, or None if there are not enough colours."""
+    found: list[curves.Family] = []
+    first = 0
+    for name, data in series.items():
+        found.append(curves.family(data, output, view.along[0], view.by, name if len(series) > 1 else "", first))
+        first += len(found[-1].curves)
+    return found if len(series) == 1 or first <= colours.most() else None
+
+
+def _by_value(found: Series, view: View) -> tuple[list[Part], list[str]]:
+    parts: dict[Any, Part] = {}
+    left_out = []
     for name, data in found.items():
-        for k in range(data.sizes[view.panels]):
-            part = data.isel({view.panels: k})
+        some, sentences = curves.thin(data, view.panels, MOST_PANELS)
+        left_out += sentences
+        for k in range(some.sizes[view.panels]):
+            part = some.isel({view.panels: k})
             title = labels.named(view.panels, part[view.panels])
-            parts.setdefault(part[view.panels].item(), _Part(title, {})).series[name] = part
-    keys = sorted(parts)
-    kept = np.unique(np.linspace(0, len(keys) - 1, min(len(keys), MOST_PANELS)).round().astype(int))
-    left_out = f"{len(keys) - kept.size} of {len(keys)} values of {view.panels} ({kept.size} drawn, spread evenly)"
-    return [parts[keys[k]] for k in kept], [left_out] if kept.size < len(keys) else []
+            parts.setdefault(part[view.panels].item(), (title, {}))[1][name] = part
+    return [parts[key] for key in sorted(parts)], left_out
 
 
-def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]:
+def _by_series(found: Series) -> tuple[list[Part], list[str]]:
     names = list(found)
     rest = [f"series {', '.join(names[MOST_PANELS:])}"] if len(names) > MOST_PANELS else []
-    return [_Part(f"series {name}" if name else "", {name: found[name]}) for name in names[:MOST_PANELS]], rest
+    return [(f"series {name}" if name else "", {name: found[name]}) for name in names[:MOST_PANELS]], rest
 
 
-def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
+def _panel(title: str, families: Sequence[curves.Family], view: View, output: str, x: Axis) -> Panel:
     """Draw one panel: the curves of all series in the panel, laws for these curves, and marks for cases without a
     value.
     """
-    panel = Panel(x, Axis(""), title=part.title, bar=next(iter(families.values())).bar)
+    panel = Panel(x, Axis(""), title=title, bar=families[0].bar)
     along, law_name = view.along[0], ""
     marked: dict[str, str] = {}
-    every = [curve for one in families.values() for curve in one.curves]
+    varying: dict[str, None] = {}
+    every = [curve for one in families for curve in one.curves]
     several_styles = panel.bar or len({curve.line for curve in every}) > 1
     for curve in every:
         data = _counted(curve.data, output)
@@ -354,29 +357,17 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
         if curve.line and not several_styles and (law := laws.law_of(data, output)):
             panel.traces.append(_law(curve, law, along, output))
             law_name = law.name
-    panel.keys = [key for one in families.values() for key in one.keys]
+        dim = curves.along_dim(curve.data, along, output)
+        varying |= dict.fromkeys(
+            name for name in curves.parameters_along(curve.data, dim) if dim and name not in (along, view.by)
+        )
+    panel.keys = [key for one in families for key in one.keys]
     if law_name:
         panel.keys.append(Key(law_name, "#000000", "--"))
     panel.keys += [Key(name, "#404040", "", mark) for name, mark in marked.items()]
-    varying = dict.fromkeys(name.replace("_", " ") for one in families.values() for name in one.varying)
     if varying:
-        panel.keys.append(Key(f"varying too: {', '.join(varying)}", "none"))
+        panel.keys.append(Key(f"varying too: {', '.join(varying)}".replace("_", " "), "none"))
     return panel
-
-
-def _families(series: Mapping[str, xr.Dataset], view: View, output: str) -> dict[str, curves.Family]:
-    """Return the curves of all series of a panel. Curves of two series never have the same colour."""
-    found: dict[str, curves.Family] = {}
-    first = 0
-    for name, data in series.items():
-        found[name] = curves.family(data, output, view.along[0], view.by, name if len(series) > 1 else "", first)
-        first += len(found[name].curves)
-    if len(series) > 1 and first > colours.most():
-        raise DataError(
-            f"expected at most {colours.most()} curves of several series in a panel, got {first}: "
-            "select fewer curves, or leave out 'panels'"
-        )
-    return found
 
 
 def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
@@ -430,12 +421,12 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
         raise DataError("expected a map of one series, without 'by', because colours show the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
     drawn = []
-    for part in parts:
-        ((_, data),) = part.series.items()
+    for title, series in parts:
+        (data,) = series.values()
         shown_along = {curves.along_dim(data, name, output) for name in view.along}
         data, sentences = curves.hold(data, [dim for dim in curves.axes_of(data, output) if dim not in shown_along])
         left_out += sentences
-        drawn.append((part.title, data, curves.mean(data, output)))
+        drawn.append((title, data, curves.mean(data, output)))
     every = np.concatenate([np.ravel(value.value) for _, _, value in drawn])
     bar = colours.bar(labels.label(output, drawn[0][1][output]), every, None if view.log is None else "z" in view.log)
     panels = []
@@ -451,70 +442,10 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
             panels[-1].keys = [Key("no value", "#606060", "", "x")]
     figure = Figure(panels, "", share_y=len(panels) > 1)
     figure.states = [data["status"] for _, data, _ in drawn if "status" in data]
-    figure.fixed = curves.fixed_text(curves.fixed_by_all([curves.scalars(data) for _, data, _ in drawn]), drawn[0][1])
+    figure.fixed = curves.fixed_text(curves.fixed_by_all(data for _, data, _ in drawn), drawn[0][1])
     half = np.concatenate([np.ravel(value.high - value.low) / 2 for _, _, value in drawn])
     unit = labels.printed_unit(labels.quantity(output, drawn[0][1][output]).unit)
     if np.isfinite(half).any() and np.nanmax(half) > 1e-12 * np.nanmax(abs(every)):
         figure.bars = f"95 % intervals: at most ±{np.nanmax(half):.2g} {unit}".rstrip()
     figure.leave_out(left_out)
     return figure
-
-
-# main effects
-
-
-def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw main effects: in each panel, the output against one parameter, averaged over all other parameters."""
-    if len(found) > 1 or view.by or view.panels:
-        raise DataError(
-            f"expected one series, without 'by' and 'panels', got {', '.join(found)}: main effects need a whole figure"
-        )
-    ((_, data),) = found.items()
-    names = varied(data, output)
-    if not names:
-        raise DataError(f"expected an output that varies with a parameter, got {output}")
-    how = labels.quantity(output, data[output])
-    cases = how.of(aggregation.mean(data[output]))
-    y = _height(view, output, data[output], cases)
-    panels = []
-    for name in names[:MOST_EFFECTS]:
-        dim = curves.along_dim(data, name, output) or name
-        panel = Panel(_axis(name, [data[name]], view, "x"), y)
-        if cases.size <= MOST_POINTS:
-            x, y_of = xr.broadcast(_places(data, name), cases)
-            one = Trace("curve", columns(data, x=x, y=y_of), label="one case", colour="#b0b0b0", marker=".")
-            panel.traces.append(one)
-        x_of, value = _bins(data, output, name, dim) if _is_sampled(data, dim) else _means(data, output, name)
-        shown = columns(x=x_of, y=Mean(*map(how.of, value)))
-        label = "mean over all other parameters, 95 % interval"
-        panel.traces.append(Trace("curve", shown, "mean", label, colours.colour(0), "-", "o", bars=True))
-        panels.append(panel)
-    figure = Figure(panels, "", share_y=True)
-    figure.fixed = curves.fixed_text(curves.scalars(data), data)
-    figure.leave_out([", ".join(names[MOST_EFFECTS:])])
-    figure.leave_out([f"the {cases.size} cases themselves"] if cases.size > MOST_POINTS else [])
-    return figure
-
-
-def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
-    """For every value of one axis, return the mean of an output over all other axes, and the interval of this mean."""
-    rest = [dim for dim in curves.axes_of(data, output) if dim != name]
-    error = aggregation.companion(data, output)
-    pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
-    return _places(data, name), Mean(*aggregation.mean_and_ends(*pair))
-
-
-def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Sort the n cases of a sampled study by one parameter, divide the cases into sqrt(n) groups, and return the means
-    of the groups.
-    """
-    cases = aggregation.mean(data[output])
-    cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
-    order = np.argsort(cases[name].values, kind="stable")
-    groups = [cases.isel({dim: part}) for part in np.array_split(order, int(np.sqrt(cases.size)))]
-    across = [float(_places(group.to_dataset(name=output), name).mean()) for group in groups]
-    means = [
-        aggregation.mean_and_ends(group.rename({dim: "realisation"}).reset_coords(drop=True), None) for group in groups
-    ]
-    joined = Mean(*(xr.concat(ends, "bin") for ends in zip(*means, strict=True)))
-    return xr.DataArray(across, dims="bin"), joined

@@ -52,8 +52,8 @@ def test_nothing_overlaps_and_nothing_is_cut(size, case):
             assert figure.get_figwidth() == pytest.approx(asked.width)
 
 
-@pytest.mark.parametrize("view", [View("mu", ("velocity", "load")), View("mu"), View("mu", "velocity", panels="load")])
-def test_maps_effects_and_panels_do_not_overlap(view):
+@pytest.mark.parametrize("view", [View("mu", ("velocity", "load")), View("mu", "velocity", panels="load")])
+def test_maps_and_panels_do_not_overlap(view):
     with page.drawing_for(page.requested("85mm")):
         figure = render(draw({"": study(5, 4)}, view))
         assert not list(problems(figure))

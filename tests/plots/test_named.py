@@ -45,7 +45,7 @@ FIGURES = {
     ),
     "temperature": (ROLLERS, ["breakthrough_probability"]),
     "profiles": (PROFILES, ["upper_profile", "lower_profile"]),
-    "trace": (PROFILES, ["contact_length_trace"] * 6),
+    "trace": (PROFILES, ["contact_length_trace"]),
     "film_profile": (FILM + "  inlet: [-4, -2]\n", ["pressure", "film"]),
     "starvation": (FILM + "  inlet: [-4, -2, -1.5]\n", ["central_film", "minimum_film"]),
     "traction": (FILM + "  slide_roll_ratio: [0.01, 0.1, 0.2]\n", ["traction_coefficient"]),

@@ -67,11 +67,10 @@ def test_pure_numbers_and_profiles_have_linear_axes(groups):
     assert described(groups, MU, "velocity", log="xy").panels[0].y.log
 
 
-def test_without_by_a_second_axis_has_line_styles(groups):
+def test_without_by_the_longest_axis_has_colours(groups):
     figure = described(groups, MU, "velocity")
-    assert len(rows(figure).groupby(["normal_force", "hurst"])) == 10
-    assert len(figure.panels[0].keys) == 7  # five colours and two line styles
-    assert not figure.left_out
+    assert len(rows(figure).groupby("normal_force")) == len(figure.panels[0].keys) - 1 == 5  # and the law
+    assert figure.left_out == ["1 of 2 values of hurst (drawn: $H$ = 0.7)"]
 
 
 def test_the_unit_of_the_campaign_or_of_the_user_is_shown(groups):
@@ -143,16 +142,6 @@ def test_a_map_has_the_mean_of_every_case(groups):
     assert "at most ±" in figure.bars
 
 
-def test_effects_are_means_over_everything_else(groups):
-    figure = described(groups, MU, ())
-    assert [panel.x.quantity for panel in figure.panels] == ["normal_force", "velocity", "hurst"]
-    drawn = rows(figure, "mean")
-    mean = aggregation.mean(groups[""][MU])
-    for k, name in enumerate(("normal_force", "velocity", "hurst")):
-        wanted = mean.mean([dim for dim in mean.dims if dim != name])
-        np.testing.assert_allclose(drawn[drawn.panel == k + 1].y, wanted, rtol=1e-12)
-
-
 def test_a_sampled_study_is_drawn_as_points(tmp_path):
     lhs = "  normal_force: {geometric: [1 mN, 100 N]}\n  velocity: {geometric: [0.01 mm/s, 1 m/s]}\n"
     lhs += "sampling: {latin_hypercube: 24}\n"
@@ -165,8 +154,7 @@ def test_a_sampled_study_is_drawn_as_points(tmp_path):
     assert [trace.kind for trace in figure.panels[0].traces] == ["dots"]
     assert "varying too: normal force" in [key.label for key in described(groups, MU, "velocity").panels[0].keys]
     assert {trace.kind for trace in described(groups, MU, ("velocity", "normal_force")).panels[0].traces} == {"dots"}
-    binned = rows(described(groups, MU, ()), "mean")
-    assert binned[binned.panel == 1].y.mean() == pytest.approx(float(mean.mean()))
+    assert described(groups, MU).panels[0].x.quantity == "normal_force"
 
 
 def test_several_series_share_a_panel_or_have_their_own(tmp_path):
@@ -206,7 +194,7 @@ def test_words_are_ticks_and_cases_without_value_are_marked(tmp_path, monkeypatc
         (View(MU, "rms_roughness"), "is fixed"),
         (View(MU, "velocity", by="velocity"), "requested twice"),
         (View(MU, ("velocity", "hurst"), by="normal_force"), "without .by."),
-        (View(MU, by="hurst"), "main effects need a whole figure"),
+        (View(MU, ()), "varies with a parameter"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused_with_the_reason(groups, view, message):
