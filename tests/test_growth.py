@@ -83,44 +83,16 @@ def test_fewer_outputs_go_on_with_the_stored_ones_and_more_are_refused(toy, url)
         run(both, url + "2")
 
 
-def test_series_are_put_beside_a_study_made_without_and_the_one_that_is_it_goes_on(toy, url):
-    plain = toy.campaign(toy.axis("position", [1.0, 4.0]))
-    run(plain, url)
-    before, expected = digests(url), values(url)
-    early = xr.open_zarr(url, chunks=None)
-    own = replace(plain.series[0], name="near")
-    other = replace(own, name="far", parameters=own.parameters.model_copy(update={"slope": 7.0}))
-    toy.COMPUTED.clear()
-    assert run(replace(plain, series=(own, other)), url).done == 12
-    assert len(toy.COMPUTED) == 12
-    found = store.datasets(url)
-    assert list(found) == ["-", "far"]
-    np.testing.assert_array_equal(found["-"].height, expected)
-    np.testing.assert_array_equal(early.height, expected)
-    assert np.isfinite(found["far"].height).all()
-    assert {name: digest for name, digest in digests(url).items() if name in before} == before
-    assert [record["attempt"] for record in store.records(url, "-")] == [
-        record["attempt"] for record in store.records(url, "")
-    ]
-    assert run(plain, url).kept == 12
-    longer = replace(own, axes=(toy.axis("position", [1.0, 2.0, 4.0]),))
-    assert run(replace(plain, series=(other, longer)), url).done == 6
-    assert store.datasets(url)["-"].position.to_numpy().tolist() == [1.0, 2.0, 4.0]
-    assert run(replace(plain, series=(replace(other, name="farther"),)), url).done == 12
-    assert list(store.datasets(url)) == ["-", "far", "farther"]
-
-
-def test_a_series_named_like_an_array_at_the_root_and_a_study_beside_series_are_refused(toy, url):
+def test_a_study_with_series_and_a_study_without_need_stores_of_their_own(toy, url):
     plain = toy.campaign(toy.axis("position", [1.0]))
+    series = replace(plain, series=(replace(plain.series[0], name="near"),))
     run(plain, url)
-    other = plain.series[0].parameters.model_copy(update={"slope": 7.0})
-    series = replace(plain, series=(replace(plain.series[0], name="height", parameters=other),))
     before = digests(url)
-    with pytest.raises(StoreError, match="series height: an array of the store has that name"):
+    with pytest.raises(StoreError, match="series: none in the store, near in the campaign"):
         run(series, url)
     assert digests(url) == before
     run(series, url + "2")
-    with pytest.raises(StoreError, match="series: height in the store, none in the campaign"):
+    with pytest.raises(StoreError, match="series: near in the store, none in the campaign"):
         run(plain, url + "2")
 
 

@@ -19,7 +19,7 @@ from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.campaign.definition import SAME_DIGITS
 from mdr_dask.errors import StoreError
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.store.files import ROOT, absolute
+from mdr_dask.store.files import absolute
 from mdr_dask.store.layout import plain_values
 from mdr_dask.store.study import attributes, document, series_names
 
@@ -42,7 +42,6 @@ class Stored:
 def reconcile(url: str, campaign: Campaign) -> Stored:
     """Compare a campaign with the store to be resumed or extended; raise StoreError with a list of all differences."""
     attributes(url)  # raises StoreError if this is not a study
-    campaign = _with_root(url, campaign)
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
     held = {name: found for name, found in groups.items() if found is not None}
     differences = _study_differences(url, campaign)
@@ -109,27 +108,11 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
     now = {"model": campaign.model, "seed": campaign.seed, "accuracy": campaign.accuracy}
     found = [_difference(key, root[key], value) for key, value in now.items() if root[key] != value]
     names, names_now = series_names(url), [series.name for series in campaign.series]
-    if "" in names_now and not {"", ROOT} & set(names):
+    if ("axes" in root) != ("" in names_now):
         found.append(
-            f"series: {' '.join(names)} in the store, none in the campaign: give this one a named series as well"
+            f"series: {' '.join(names) or 'none'} in the store, {' '.join(names_now) or 'none'} in the campaign"
         )
-    members = (document(url) or {})["consolidated_metadata"]["metadata"]
-    arrays = {name for name, member in members.items() if member["node_type"] == "array"}
-    found += [f"series {name}: an array of the store has that name" for name in names_now if name in arrays]
     return found
-
-
-def _with_root(url: str, campaign: Campaign) -> Campaign:
-    """Return the campaign, with an empty name for the series that matches the results at the root of the store."""
-    root = _group_attributes(url, "")
-    if root is None or any(not series.name for series in campaign.series):
-        return campaign
-    for i, series in enumerate(campaign.series):
-        known = _group_attributes(url, series.name) is not None
-        if not known and not _series_differences(series, root, campaign.outputs):
-            moved = (*campaign.series[:i], replace(series, name=""), *campaign.series[i + 1 :])
-            return replace(campaign, series=moved)
-    return campaign
 
 
 def _difference(what: str, stored: Any, now: Any) -> str:

@@ -40,8 +40,6 @@ from mdr_dask.version import __version__
 
 #: Number of values in a chunk of a coordinate. With this large number, nearly every axis has a single chunk.
 _COORDINATE_CHUNK = 4096
-#: Names of the attributes that `_series_attributes` returns.
-OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 #: Packages whose versions are written to the store.
 PACKAGES = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
@@ -61,7 +59,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     root = json.loads(json.dumps(held)) if held else {"attributes": {}, "consolidated_metadata": {"metadata": {}}}
     members, earlier = root["consolidated_metadata"]["metadata"], root["attributes"]
     coordinates: dict[str, bytes] = {}
-    attributes = {name: earlier[name] for name in OF_SERIES if name in earlier}
+    attributes: dict[str, Any] = {}
     is_new = held is None or not all(_has_shape(url, held, template) for template in layout)
     study = _study_attributes(layout[0].campaign, earlier)
     for template in layout:
