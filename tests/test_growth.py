@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import toy
-import xarray as xr
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
