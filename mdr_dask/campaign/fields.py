@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -62,27 +61,13 @@ def listed(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
-    """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
-
-    If several sets fit, return the set whose field names are most similar to the keys of the mapping.
-    """
+    """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``."""
     if not isinstance(value, dict):
         return None
-    fitting = [
-        kind
-        for kind in structures(info)
-        if all(value.get(key, kind.model_fields[key].default) == only for key, only in fixed(kind).items())
-    ]
-    return max(fitting, key=lambda kind: _likeness(kind, value), default=None)
-
-
-def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
-    """Return how many keys of a mapping are field names of a parameter set, and how many resemble a field name."""
-    keys = [str(key) for key in value]
-    return (
-        sum(key in kind.model_fields for key in keys),
-        sum(bool(get_close_matches(key, kind.model_fields)) for key in keys),
-    )
+    for kind in structures(info):
+        if all(value.get(key, kind.model_fields[key].default) == only for key, only in fixed(kind).items()):
+            return kind
+    return None
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:

@@ -39,12 +39,11 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
     """Report every error of ``kind.model_validate(data)``. All errors of the same value become one message."""
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
-        if _is_of_another_branch(details, kind, data):
-            continue
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
-        if inside and group[0]["type"] == "too_short":  # another message names each missing entry
+        # another message names each missing entry, or what is wrong inside a mapping that may also be a word
+        if inside and group[0]["type"] in ("too_short", "literal_error"):
             continue
         _report_group(path, group, kind, data, report)
 
@@ -62,23 +61,6 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
     if details["type"] == "union_tag_invalid":
         path = (*path, *[key for key, value in data.items() if str(value) == details["ctx"]["tag"]][:1])
     return path
-
-
-def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error comes from another parameter set than the set that the keys of the value suggest."""
-    path: Path = ()
-    value = data
-    for part in details["loc"]:
-        if isinstance(value, Mapping) and part in value:
-            path, value = (*path, part), value[part]
-            continue
-        info = fields.field_at(kind, path, data)
-        claimed = fields.structure(info, value) if info else None
-        if info and claimed:
-            others = {one.__name__ for one in fields.structures(info)} - {claimed.__name__}
-            if part in others or str(part).startswith("literal["):
-                return True
-    return False
 
 
 def value_at(data: Any, path: Path) -> Any:

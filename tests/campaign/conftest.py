@@ -29,10 +29,6 @@ class Plane(Parameters):
     shape: Literal["plane"]
 
 
-class Smooth(Parameters):
-    wavelength: float = quantity("m", "length of the waves", gt=0)
-
-
 class Traced(Parameters):
     trace: NamedFile
 
@@ -53,7 +49,7 @@ class Rubbing(Parameters):
     moduli: tuple[float, ...] = quantity("Pa", "moduli of the Prony series", default=(1e6,), strict=False, min_length=1)
     indenter: Indenter = Field(Plane(shape="plane"), description="shape of the indenter")
     depth: float | None = quantity("m", "depth of the layer, endless if not given", default=None, gt=0)
-    finish: Literal["ground", "lapped"] | Smooth | Traced = Field("ground", description="finish of the surface")
+    finish: Literal["ground", "lapped"] | Traced = Field("ground", description="finish of the surface")
     profile: NamedFile | None = Field(None, description="measured line")
 
     @model_validator(mode="after")

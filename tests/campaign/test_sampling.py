@@ -78,7 +78,7 @@ def test_a_table_gives_the_cases(tmp_path):
     [
         ("indenter.angle", "expected indenter: {shape: cone} in the campaign file"),
         ("indenter.exponent", "expected indenter: {shape: power, radius: ...} in the campaign file"),
-        ("finish.wavelength", "expected finish: {} in the campaign file"),
+        ("finish.trace", "expected finish: {} in the campaign file"),
         ("indenter.angel", "no such parameter"),
         ("velocty", r"no such parameter \(did you mean 'velocity'\?\)"),
     ],
