@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from mdr_dask.questions.table import Table
 
-#: Without a limit, an aligned table is printed in pieces of about this number of rows.
-AT_ONCE = 2**16
 FILES = (".csv", ".json", ".nc", ".zarr")
 
 
@@ -65,12 +63,14 @@ def check_target(path: Path) -> None:
 def _print_aligned(answer: Table, limit: int, join: bool) -> None:
     import pandas as pd
 
+    from mdr_dask.questions.table import ROWS
+
     waiting: list[pd.DataFrame] = []
     count, printed = 0, False
     for frame in answer.frames:
         waiting.append(frame)
         count += len(frame)
-        if count >= (limit or AT_ONCE):
+        if count >= (limit or ROWS):
             whole = pd.concat(waiting, ignore_index=True)
             _print_frame(whole[:limit] if limit else whole, answer, join)
             if limit:

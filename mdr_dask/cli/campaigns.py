@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.bars import at_work
+from mdr_dask.cli.options import json_option
 from mdr_dask.cli.printing import print_json, print_named, say, terminal_width
 from mdr_dask.cli.writing import writing
 
@@ -21,7 +22,7 @@ CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 @click.command()
 @click.argument("name", required=False)
-@click.option("--json", "form", flag_value="json", help="Print one JSON document.")
+@json_option
 def models(name: str | None, form: str | None) -> None:
     """List the models, or the parameters and outputs of one model.
 
@@ -123,7 +124,7 @@ def init(model: str, output: Path | None) -> None:
 
 @click.command()
 @click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
-@click.option("--json", "form", flag_value="json", help="Print one JSON document.")
+@json_option
 def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     """Check campaign files, and print the axes, the number of results, the size and the computing time of each study.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mdr_dask.cli.options import json_option, limit_option
 from mdr_dask.cli.printing import print_json, print_rows, printable
 
 if TYPE_CHECKING:
@@ -20,14 +21,8 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Write metadata again; remove damaged blocks and coordinates for the next run.",
 )
-@click.option(
-    "--limit",
-    type=click.IntRange(min=0),
-    default=40,
-    show_default=True,
-    help="Largest number of lines to print; 0 for all.",
-)
-@click.option("--json", "form", flag_value="json", help="Print one JSON document.")
+@limit_option
+@json_option
 def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     """Read every file of a store, and list damaged, missing and foreign files; exit code 1 if there are any.
 

@@ -393,13 +393,10 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
     if "status" not in data:
         return []
     found = []
-    rest = data[output].isnull().all("realisation")
-    here_of = {}
-    for state, look in MARKS.items():
-        here_of[look] = rest & (data["status"] == state.value).any("realisation")
-        rest = rest & ~here_of[look]
+    without = data[output].isnull().all("realisation")
+    here_of = {look: without & (data["status"] == state.value).any("realisation") for state, look in MARKS.items()}
     failed = data["status"].isin([Status.FAILED.value, Status.NOT_CONVERGED.value])
-    here_of[SOME] = failed.any("realisation") & data[output].notnull().any("realisation")
+    here_of[SOME] = failed.any("realisation") & ~without
     for (mark, reason), here in here_of.items():
         if bool(here.any()):
             place = np.flatnonzero(np.atleast_1d(here.values))

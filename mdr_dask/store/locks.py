@@ -373,20 +373,15 @@ def _retire(url: str, name: str) -> None:
             runner.unlink(missing_ok=True)
 
 
-def _claims(name: str) -> str:
-    return f"{CLAIMS}{name or 'alone'}/"
-
-
-def _claim(name: str, number: int) -> str:
-    return f"{_claims(name)}{number:06d}.json"
-
-
-def _life(name: str, number: int) -> str:
-    return f"{_claims(name)}{number:06d}.life"
+def _claim(name: str, number: int, ending: str = "json") -> str:
+    """Return the name of the file of a claim or, with the ending ``life``, of its signs of life."""
+    return f"{CLAIMS}{name or 'alone'}/{number:06d}.{ending}"
 
 
 def _numbers(url: str, name: str) -> list[int]:
-    claims = [claim.rpartition("/")[2] for claim in listed(url, _claims(name)) if claim.endswith(".json")]
+    claims = [
+        claim.rpartition("/")[2] for claim in listed(url, f"{CLAIMS}{name or 'alone'}/") if claim.endswith(".json")
+    ]
     return [int(claim.removesuffix(".json")) for claim in claims]
 
 
@@ -401,7 +396,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
         while not ended.wait(BEAT):
             # go on after an error: the network may come back, and blocks are written only while the claim exists
             with suppress(StoreError):
-                write_bytes(url, _life(name, number), json.dumps({"time": time.time()}).encode())
+                write_bytes(url, _claim(name, number, "life"), json.dumps({"time": time.time()}).encode())
 
     alive = threading.Thread(target=live, daemon=True)
     alive.start()
@@ -412,7 +407,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
         alive.join()
         with suppress(StoreError):  # if there is no network, the next run replaces the claim
             if _read_claim(url, _claim(name, number)).get("owner") == owner:
-                remove(url, [_claim(name, number), _life(name, number)])
+                remove(url, [_claim(name, number), _claim(name, number, "life")])
 
 
 def _make_claim(url: str, name: str, owner: str) -> int:
@@ -430,21 +425,21 @@ def _make_claim(url: str, name: str, owner: str) -> int:
         log.warning(
             "%s: nothing prevents two simultaneous runs here (no conditional write): start one run at a time", url
         )
-    remove(url, [old for n in standing for old in (_claim(name, n), _life(name, n))])
+    remove(url, [old for n in standing for old in (_claim(name, n), _claim(name, n, "life"))])
     return number
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
     """Return whether the owner of a claim has recently written a sign of life, or writes a sign of life soon."""
     claim = _read_claim(url, _claim(name, number))
-    last = _read_claim(url, _life(name, number)) or claim
+    last = _read_claim(url, _claim(name, number, "life")) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:
         return True
     if not claim and read_bytes(url, _claim(name, number)) is None:
         return True  # the owner has just ended, and another run may have started
     log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
     time.sleep(2 * BEAT)
-    return (_read_claim(url, _life(name, number)) or claim) != last
+    return (_read_claim(url, _claim(name, number, "life")) or claim) != last
 
 
 def _read_claim(url: str, name: str) -> dict[str, Any]:

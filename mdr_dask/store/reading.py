@@ -48,7 +48,7 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
     The values of numeric axes are in ascending order. The results of a study without series have the name ``""``, or
-    ``"-"`` if series were added later. Groups larger than `LAZY_BYTES` contain Dask arrays.
+    ``"-"`` if an earlier version has added series. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
     with readable(url):
         names = series_names(url)
