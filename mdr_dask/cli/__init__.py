@@ -16,15 +16,12 @@ import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import plot
-from mdr_dask.cli.fitting import fit
-from mdr_dask.cli.law import law
+from mdr_dask.cli.fitting import fit, sensitivity
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable, say
-from mdr_dask.cli.publishing import publish, report
-from mdr_dask.cli.results import show, status
+from mdr_dask.cli.results import law, show, status
 from mdr_dask.cli.running import run
-from mdr_dask.cli.sensitivity import sensitivity
-from mdr_dask.cli.storage import verify
+from mdr_dask.cli.storage import publish, report, verify
 from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 

@@ -358,9 +358,8 @@ def _panel(title: str, families: Sequence[curves.Family], view: View, output: st
             panel.traces.append(_law(curve, law, along, output))
             law_name = law.name
         dim = curves.along_dim(curve.data, along, output)
-        varying |= dict.fromkeys(
-            name for name in curves.parameters_along(curve.data, dim) if dim and name not in (along, view.by)
-        )
+        together = curves.parameters_along(curve.data, dim) if dim else []
+        varying |= dict.fromkeys(name for name in together if name not in (along, view.by))
     panel.keys = [key for one in families for key in one.keys]
     if law_name:
         panel.keys.append(Key(law_name, "#000000", "--"))

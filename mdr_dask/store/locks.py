@@ -379,10 +379,8 @@ def _claim(name: str, number: int, ending: str = "json") -> str:
 
 
 def _numbers(url: str, name: str) -> list[int]:
-    claims = [
-        claim.rpartition("/")[2] for claim in listed(url, f"{CLAIMS}{name or 'alone'}/") if claim.endswith(".json")
-    ]
-    return [int(claim.removesuffix(".json")) for claim in claims]
+    folder = _claim(name, 0).rpartition("/")[0]
+    return [int(Path(claim).stem) for claim in listed(url, f"{folder}/") if claim.endswith(".json")]
 
 
 @contextmanager
