@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -27,6 +27,7 @@ MARKS = {
     Status.MISSING: ("1", "missing"),
 }
 SOME = "v", "mean without realisations that failed"
+T = TypeVar("T")
 Series = Mapping[str, xr.Dataset]
 #: The title of a panel, and the series in the panel.
 Part = tuple[str, dict[str, xr.Dataset]]
@@ -281,34 +282,35 @@ def _divided(found: Series, view: View, output: str) -> tuple[list[tuple[str, li
     """
     if view.panels:
         parts, left_out = _by_value(found, view)
-    else:
-        together = _together(found, view, output)
-        if together is not None:
-            return [("", together)], []
-        alone = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
-        kept, left_out = curves.with_one_legend(alone)
-        parts, more = _by_series({name: found[name] for name in kept})
-        left_out += more
-    panels = []
-    for title, series in parts:
-        families = _together(series, view, output)
-        if families is None:
+        panels = [(title, _together(series, view, output)) for title, series in parts]
+        if not all(_fit(families) for _, families in panels):
             raise DataError(
                 f"expected at most {colours.most()} curves of several series in a panel, got more: "
                 "select fewer curves, or leave out 'panels'"
             )
-        panels.append((title, families))
-    return panels, left_out
+        return panels, left_out
+    together = _together(found, view, output)
+    if _fit(together):
+        return [("", together)], []
+    alone = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
+    kept, left_out = curves.with_one_legend(alone)
+    panels, more = _by_series({name: [alone[name]] for name in kept})
+    return panels, [*left_out, *more]
 
 
-def _together(series: Series, view: View, output: str) -> list[curves.Family] | None:
-    """Return the curves of several series in one panel, or None if there are not enough colours."""
+def _together(series: Series, view: View, output: str) -> list[curves.Family]:
+    """Return the curves of all series of a panel. Curves of two series have different colours."""
     found: list[curves.Family] = []
     first = 0
     for name, data in series.items():
         found.append(curves.family(data, output, view.along[0], view.by, name if len(series) > 1 else "", first))
         first += len(found[-1].curves)
-    return found if len(series) == 1 or first <= colours.most() else None
+    return found
+
+
+def _fit(families: Sequence[curves.Family]) -> bool:
+    """Return whether the curves of several series can have different colours."""
+    return len(families) == 1 or sum(len(one.curves) for one in families) <= colours.most()
 
 
 def _by_value(found: Series, view: View) -> tuple[list[Part], list[str]]:
@@ -324,10 +326,10 @@ def _by_value(found: Series, view: View) -> tuple[list[Part], list[str]]:
     return [parts[key] for key in sorted(parts)], left_out
 
 
-def _by_series(found: Series) -> tuple[list[Part], list[str]]:
-    names = list(found)
+def _by_series(each: Mapping[str, T]) -> tuple[list[tuple[str, T]], list[str]]:
+    names = list(each)
     rest = [f"series {', '.join(names[MOST_PANELS:])}"] if len(names) > MOST_PANELS else []
-    return [(f"series {name}" if name else "", {name: found[name]}) for name in names[:MOST_PANELS]], rest
+    return [(f"series {name}" if name else "", each[name]) for name in names[:MOST_PANELS]], rest
 
 
 def _panel(title: str, families: Sequence[curves.Family], view: View, output: str, x: Axis) -> Panel:
@@ -415,10 +417,12 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     """
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without 'by', because colours show the values")
-    parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
+    parts, left_out = _by_series(found)
+    if view.panels:
+        by_value, left_out = _by_value(found, view)
+        parts = [(title, data) for title, series in by_value for data in series.values()]
     drawn = []
-    for title, series in parts:
-        (data,) = series.values()
+    for title, data in parts:
         shown_along = {curves.along_dim(data, name, output) for name in view.along}
         data, sentences = curves.hold(data, [dim for dim in curves.axes_of(data, output) if dim not in shown_along])
         left_out += sentences
