@@ -25,8 +25,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots import page
 from mdr_dask.questions import selection
 from mdr_dask.questions.columns import Columns, numbers, states
-from mdr_dask.questions.labelled import labelled
-from mdr_dask.questions.table import MEANS, Question
+from mdr_dask.questions.table import MEANS, Question, labelled
 from mdr_dask.questions.table import table as rows_of
 from mdr_dask.summary import Summary, summary
 from mdr_dask.tables import is_table

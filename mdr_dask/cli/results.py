@@ -152,8 +152,7 @@ def show(
     """
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
-    from mdr_dask.questions.labelled import labelled
-    from mdr_dask.questions.table import Question, table
+    from mdr_dask.questions.table import Question, labelled, table
 
     if output is not None:
         if form:

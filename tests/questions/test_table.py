@@ -13,9 +13,8 @@ from mdr_dask.aggregation import aggregate
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
 from mdr_dask.questions import table as room
-from mdr_dask.questions.labelled import labelled
 from mdr_dask.questions.selection import where
-from mdr_dask.questions.table import MEANS, Question, boxes, table
+from mdr_dask.questions.table import MEANS, Question, boxes, labelled, table
 
 SHAPE = (3, 4, 6)
 FORCES, VELOCITIES = [0.1, 1.0, 10.0], [0.001, 0.01, 0.1, 1.0]
@@ -156,7 +155,7 @@ def test_orders_put_what_is_not_there_last(study, limit, most, monkeypatch):
 def test_arrays_are_made_piece_by_piece(study, monkeypatch):
     question = Question(columns=("load_number",), outputs=("friction_coefficient",), where="velocity < 0.5")
     plain = labelled(study, question)
-    monkeypatch.setattr("mdr_dask.questions.labelled.PIECE", 64)
+    monkeypatch.setattr("mdr_dask.questions.table.PIECE", 64)
     lazy = labelled(study, question)
     assert lazy.friction_coefficient_mean.data.npartitions > 2
     assert all(array.chunks for array in lazy.filter_by_attrs(units="1").data_vars.values() if array.ndim > 1)
