@@ -26,8 +26,6 @@ ROUNDING = 1e-13
 GAP, NARROWEST = 2, 40
 #: Least width, in characters, to which a text in the last column is wrapped.
 WRAPPED = 30
-#: Numbers below `_SMALL` or above `_LARGE` are printed with a power of ten.
-_SMALL, _LARGE = 1e-4, 1e6
 UNKNOWN = "-"
 #: A space at which lines are not broken.
 _BLANK = "\N{NO-BREAK SPACE}"
@@ -249,11 +247,8 @@ def _error(error: float, size: float) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Return a number with `digits` digits, and with a power of ten if the number is very small or very large."""
-    text = f"{value:.{digits}g}"
-    if "e" in text and _SMALL <= abs(float(text)) < _LARGE:
-        return f"{float(text):.0f}"
-    return text
+    """Return a number with `digits` digits. Only numbers from 1e10 or below 1e-4 have an exponent."""
+    return f"{float(f'{value:.{digits}g}'):.10g}"
 
 
 def short(value: Any) -> str:
