@@ -63,25 +63,21 @@ def check_target(path: Path) -> None:
 def _print_aligned(answer: Table, limit: int, join: bool) -> None:
     import pandas as pd
 
-    from mdr_dask.questions.table import ROWS
-
-    waiting: list[pd.DataFrame] = []
-    count, printed = 0, False
+    frames: list[pd.DataFrame] = []
+    count = 0
     for frame in answer.frames:
-        waiting.append(frame)
+        frames.append(frame)
         count += len(frame)
-        if count >= (limit or ROWS):
-            whole = pd.concat(waiting, ignore_index=True)
-            _print_frame(whole[:limit] if limit else whole, answer, join)
-            if limit:
-                more = count > limit or next(answer.frames, None) is not None
-                print_left(answer.total - limit if answer.total is not None else None if more else 0)
-                return
-            waiting, count, printed = [], 0, True
-    if waiting:
-        _print_frame(pd.concat(waiting, ignore_index=True), answer, join)
-    elif not printed:
+        if 0 < limit <= count:
+            break
+    if not frames:
         tell("no rows")
+        return
+    whole = pd.concat(frames, ignore_index=True)
+    _print_frame(whole[:limit] if limit else whole, answer, join)
+    if 0 < limit <= count:
+        more = count > limit or next(answer.frames, None) is not None
+        print_left(answer.total - limit if answer.total is not None else None if more else 0)
 
 
 def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
