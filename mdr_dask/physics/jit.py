@@ -85,10 +85,10 @@ def _warn_once(problem: str) -> None:
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
     """Return the last index in [low, high) where the ascending array `values` is <= x, or `low` if there is none."""
-    while high - low > 1:
-        middle = (low + high) // 2
-        if values[middle] <= x:
-            low = middle
-        else:
-            high = middle
+    length = high - low
+    while length > 1:  # the compiled loop has no branches that a processor could predict wrongly
+        half = length // 2
+        if values[low + half] <= x:
+            low += half
+        length -= half
     return low

@@ -28,20 +28,6 @@ def test_a_transient_that_misses_the_accuracy_has_a_warning() -> None:
     assert all("is missed; estimated relative errors: friction_coefficient " in messages[0, line] for line in (0, 1))
 
 
-def test_transients_below_the_accuracy_are_left_out_and_counted_in_the_error() -> None:
-    whole = of_line({"velocity": np.array([1e-4, 1e-3, 5e-3, 0.05, 0.5])})
-    exact, quick = compute(whole).values, compute(replace(whole, accuracy=1e-2)).values
-    for name in ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after"):
-        assert np.array_equal(quick[name], exact[name])
-    after = exact["friction_coefficient_after"]
-    error = np.max(np.abs(quick["friction_coefficient"] - exact["friction_coefficient"]), axis=2) / after
-    assert np.all(error < 1e-2)
-    left_out = np.all(quick["friction_coefficient"] == after[:, :, None], axis=2)
-    assert 0 < left_out.sum() < left_out.size
-    estimate = quick["friction_coefficient_error"].max(axis=2) / after
-    assert np.all(estimate[left_out] > error[left_out])
-
-
 def test_equal_cases_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four of the five cases have the same dimensionless numbers, reached through different parameters."""
     solved: list[int] = []

@@ -14,7 +14,7 @@ from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.march import Marching, Trajectory
 from mdr_dask.physics.transients.patches import LOAD, History
-from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, march
 
 SAMPLES = 12  # of a cell
 SHORT = 3.0  # samples; shorter patches cannot be judged
@@ -73,12 +73,12 @@ def searched_afresh(marching: Marching, found: Trajectory, now: int, work: Works
     return find_contact(instant, marching.reachable, work)
 
 
-def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> float:
-    """March a case of `velocity_jump` and return the largest relative error of the load at random moments.
+def worst_moment(marched: tuple, moments: int, generator: np.random.Generator) -> float:
+    """Return for a march of `velocity_jump` the largest relative error of the load at random moments.
 
     The uncertainty of the sampling is subtracted; NaN if no moment could be judged.
     """
-    marching, found, work, outcome = relaxation.march()
+    marching, found, work, outcome = marched
     if outcome != Outcome.CONVERGED:
         return np.nan
     line, worst = sampled(marching), np.nan
@@ -110,6 +110,6 @@ def judged(seed: int, number: int, moments: int) -> tuple[float, dict[str, float
     if limits.outcome != Outcome.CONVERGED:
         return np.nan, case
     request = MarchRequest(np.geomspace(0.01, 3, 20), np.pi * points, float(random.choice([6, 8, 24])))
-    cells = prepared.track.cells
-    relaxation = _Relaxation(prepared, load * cells, numbers[0] * cells, limits, request)
-    return (np.nan if limits.is_full else worst_moment(relaxation, moments, random)), case
+    if limits.is_full:
+        return np.nan, case
+    return worst_moment(march(prepared, load, numbers[0], limits, request), moments, random), case

@@ -207,7 +207,7 @@ class _Marched(_Group):
         loads, deborah, which = self.different
         is_wanted = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
-        transient = MarchRequest(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
+        transient = MarchRequest(times, wavenumber, self.steps) if is_wanted else None
         with_errors = any(f"{name}_error" in self.block.outputs for name in WITH_ERROR)
         of_transient = any(f"{name}_error" in self.block.outputs for name in TRANSIENT)
         accuracy = self.block.accuracy or (ACCURACY if with_errors else None)

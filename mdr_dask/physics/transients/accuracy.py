@@ -19,7 +19,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import SAFETY, Solution, refine
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, steady_limits
-from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, Path, jump_between
 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
 
@@ -104,7 +104,7 @@ def solve_jumps(
     jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, contact, refined.outcome)
     if march is None:
         return jumps
-    half = march._replace(per_decade=march.per_decade / 2, accuracy=0.0)
+    half = march._replace(per_decade=march.per_decade / 2)
     for k in np.flatnonzero(refined.outcome == Outcome.CONVERGED):
         fine = limits[grid, int(k)]
         jump = jump_between(lines[grid], loads[k], deborah[k], fine, march)
@@ -112,7 +112,7 @@ def solve_jumps(
         trace[k] = levels.after[k] + (jump.trace - fine.after)
         depth[k] = levels.depth[k] + (jump.depth - fine.depth[1])
         if with_errors and jump.outcome == Outcome.CONVERGED:
-            error = _left_out(jump, fine, march)
+            error = np.zeros((2, march.times.size))
             if jump.path is not None:
                 coarse = limits[grid // 2, int(k)]
                 other = jump_between(lines[grid // 2], loads[k], deborah[k], coarse, half).path
@@ -120,12 +120,6 @@ def solve_jumps(
                 error = SAFETY * _change(jump.path, fine, other, coarse, march.times)
             trace_error[k], depth_error[k] = error + np.array([[errors.after[k]], [errors.depth[k]]])
     return jumps
-
-
-def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth for a jump that was not marched. The errors are the neglected changes."""
-    changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
-    return np.repeat(changes[:, None], request.times.size, axis=1)
 
 
 def _change(

@@ -53,6 +53,7 @@ from mdr_dask.physics.transients.patches import (
     height_at,
     keeps_pressed,
     loading,
+    meeting,
     unloading,
 )
 
@@ -443,7 +444,8 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     if gap <= 0 and gap > (slope - u_slope) * (probe - i - low):
         top, gap = nearest_approach(now, recovery, i + low, probe)
     if gap > 0:
-        begin, steep, by_depth, opening = contact_begin(now, recovery, i + low, top, top - gap / abs(slope - u_slope))
+        guess = i + meeting(line, depth, u, u_slope, probe - i, low)
+        begin, steep, by_depth, opening = contact_begin(now, recovery, i + low, top, guess)
         _add_edge(search, begin, steep, by_depth, opening)
         return True, begin
     if not by_force:

@@ -170,6 +170,18 @@ def loading(line: Cubic, lift: float, deborah: float, y: float) -> float:
 
 
 @jit_inline_uncounted
+def meeting(line: Cubic, depth: float, u: float, slope: float, x: float, y: float) -> float:
+    """Return the first place from y to the end of a cell where the line rises above free elements, or `NONE`.
+
+    The free elements have the displacement u and the given slope at x. Along the line, the displacement decays
+    exponentially, which is expanded here to second order.
+    """
+    c0, c1, c2, c3 = line
+    bend = slope * slope / u if u > 0 else 0.0
+    return _zero(u - x * (slope - 0.5 * x * bend) - depth - c0, slope - x * bend - c1, 0.5 * bend - c2, -c3, y)
+
+
+@jit_inline_uncounted
 def force_at(line: Cubic, lift: float, deborah: float, y: float) -> float:
     """Return the force lift + h + deborah h' at y in a cell."""
     c0, c1, c2, c3 = line

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit
+from mdr_dask.physics.jit import jit, last_until
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.transients.contact_search import LEFT_LIMITS, Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import Marching, Trajectory, march_depth
@@ -26,19 +25,16 @@ STEEPEST = 3.0  # a cubic does not overshoot if both end slopes are at most 3 ti
 
 
 class MarchRequest(NamedTuple):
-    """Requested times and accuracy of a march.
+    """Requested times and time steps of a march.
 
     `times` are increasing times after the jump, (t - t_0) / tau. `wavenumber` is q_max L, the largest wavenumber of the
     line times the length of the line. The first time step depends on `wavenumber`. `per_decade` is the number of time
-    steps per factor of ten in time. `accuracy` is the allowed error of the friction, divided by the steady friction
-    after the jump. A transient smaller than the allowed error is not marched. With ``accuracy = 0`` every transient is
-    marched.
+    steps per factor of ten in time.
     """
 
     times: FloatArray
     wavenumber: float
-    per_decade: float = 24.0
-    accuracy: float = 0.0
+    per_decade: float
 
 
 class Path(NamedTuple):
@@ -67,39 +63,42 @@ class Path(NamedTuple):
         return np.where(times > self.time[-1], after[:, None], curve)
 
 
+@jit
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
     """Interpolate curves by cubics with given slopes, and return the values at `places`.
 
     Each row of `rows` contains the values of one curve at `x`. If the first slope of a row is NaN, the first piece is a
     parabola. A slope is reduced if the cubic would overshoot, for example where a single asperity enters or leaves
-    contact.
+    contact. The reduced slopes are written to `slopes`.
     """
-    secants = np.diff(rows) / np.diff(x)
-    beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
-    most = STEEPEST * np.minimum(beside[:, :-1], beside[:, 1:])
-    tangents = np.clip(slopes, -most, most)
-    tangents[:, 0] = np.where(np.isnan(slopes[:, 0]), 2 * secants[:, 0] - tangents[:, 1], tangents[:, 0])
-    # importing scipy.interpolate would take longer than a small study
-    piece = np.clip(np.searchsorted(x, places, side="right") - 1, 0, x.size - 2)
-    length = np.diff(x)[piece]
-    t = (places - x[piece]) / length
-    rise = rows[:, piece + 1] - rows[:, piece]
-    begin, end = length * tangents[:, piece], length * tangents[:, piece + 1]
-    curve: FloatArray = rows[:, piece] + t * (begin + t * (3 * rise - 2 * begin - end + t * (begin + end - 2 * rise)))
-    return curve
+    curves = np.empty((rows.shape[0], places.size))
+    for r in range(rows.shape[0]):
+        row, slope = rows[r], slopes[r]
+        first = before = (row[1] - row[0]) / (x[1] - x[0])
+        starts_as_parabola = np.isnan(slope[0])
+        for k in range(x.size):
+            after = (row[k + 1] - row[k]) / (x[k + 1] - x[k]) if k + 1 < x.size else before
+            most = STEEPEST * min(abs(before), abs(after))
+            slope[k], before = min(max(slope[k], -most), most), after
+        if starts_as_parabola:
+            slope[0] = 2 * first - slope[1]
+        for i in range(places.size):
+            k = last_until(x, places[i], 0, x.size - 1)
+            length, rise = x[k + 1] - x[k], row[k + 1] - row[k]
+            t, begin, end = (places[i] - x[k]) / length, length * slope[k], length * slope[k + 1]
+            curves[r, i] = row[k] + t * (begin + t * (3 * rise - 2 * begin - end + t * (begin + end - 2 * rise)))
+    return curves
 
 
 class Jump(NamedTuple):
     """Drag F_x / (4 G L) and depth at the requested times after a velocity jump.
 
-    `path` is None if there was no march. If a transient was not marched because it is smaller than the allowed error,
-    `left_out` is the estimated size of this transient. Otherwise `left_out` is 0.
+    `path` is None if there was no march.
     """
 
     trace: FloatArray
     depth: FloatArray
     path: Path | None
-    left_out: float
     outcome: Outcome
 
 
@@ -113,101 +112,79 @@ def jump_between(
     times = request.times
     if limits.outcome != Outcome.CONVERGED:
         return _failed(times, limits.outcome)
-    after, depth = np.full(times.size, limits.after), np.full(times.size, limits.depth[1])
-    settled = Jump(after, depth, None, 0.0, limits.outcome)
     if limits.is_full:  # in full contact u = d + h and the depth is constant; therefore there is no transient
-        return settled
-    relaxation = _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request)
-    transient = relaxation.transient() if request.accuracy > 0 else np.inf
-    if transient <= request.accuracy * limits.after:
-        trace = np.where(times > 0, limits.after, limits.at)
-        return settled._replace(trace=trace, depth=limits.depth[np.int64(times > 0)], left_out=transient)
-    _, found, _, outcome = relaxation.march()
+        return Jump(np.full(times.size, limits.after), np.full(times.size, limits.depth[1]), None, limits.outcome)
+    _, found, _, outcome = march(line, load, deborah, limits, request)
     if outcome != Outcome.CONVERGED:
         return _failed(times, outcome)
     values = np.stack([found.drag, found.depth - line.cells.top])  # depth relative to the mean line
     path = Path(found.time, values, np.stack([found.drag_rate, found.rate]), bool(deborah[1] < deborah[0]))
     trace, depth = path.at(times, np.array([limits.after, limits.depth[1]]))
-    return settled._replace(trace=trace, depth=depth, path=path)
+    return Jump(trace, depth, path, limits.outcome)
 
 
 def _failed(times: FloatArray, outcome: Outcome) -> Jump:
     nothing = np.full(times.size, np.nan)
-    return Jump(nothing, nothing, None, 0.0, outcome)
+    return Jump(nothing, nothing, None, outcome)
 
 
-class _Relaxation(NamedTuple):
-    """One velocity jump: the line, the load, the two Deborah numbers and the steady states. Lengths are in cells."""
+def march(
+    line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
+) -> tuple[Marching, Trajectory, Workspace, Outcome]:
+    """Return the march from the steady state before the jump to the steady state after it, and the outcome.
 
-    line: PreparedLine
-    load: float
-    deborah: FloatArray
-    limits: SteadyLimits
-    request: MarchRequest
+    In the march, lengths are in cells, and the load is F_N / (4 G dx).
+    The depth may leave the interval between the two steady depths by a margin, which is the length of the interval. If
+    this margin is not sufficient, the march is repeated with 4 times and then with 16 times the margin.
+    """
+    cells = line.track.cells
+    load, deborah = load * cells, deborah * cells
+    change = max(abs(float(np.diff(limits.depth)[0])), NEGLIGIBLE * load / cells)
+    for widening in (1, 4, 16):
+        marching, found, work = _begun(line, load, deborah, limits, request, change, widening * change)
+        outcome = march_depth(marching, found, work)
+        if outcome != LEFT_LIMITS:
+            return marching, found, work, Outcome(outcome)
+    return marching, found, work, Outcome.DEPTH_NOT_FOUND
 
-    @property
-    def ends(self) -> FloatArray:
-        """Steady depth of the highest point before and after the jump."""
-        ends: FloatArray = self.limits.depth + self.line.cells.top
-        return ends
 
-    @property
-    def change(self) -> float:
-        """Change of the steady depth due to the jump. Allowed errors of the depth are fractions of this change."""
-        return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
+def _begun(
+    line: PreparedLine,
+    load: float,
+    deborah: FloatArray,
+    limits: SteadyLimits,
+    request: MarchRequest,
+    change: float,
+    margin: float,
+) -> tuple[Marching, Trajectory, Workspace]:
+    """Return the constants, trajectory and workspace of a march. Lengths are in cells.
 
-    def transient(self) -> float:
-        """Estimate the size of the transient, with a safety factor of two."""
-        _, sums = self.line.patches(self.ends[1], self.deborah[1])
-        by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
-        limits = self.limits
-        # absolute values are added, because the drag may cross its steady value
-        return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
-
-    def march(self) -> tuple[Marching, Trajectory, Workspace, Outcome]:
-        """Return the march from the steady state before the jump to the steady state after it, and the outcome.
-
-        The depth may leave the interval between the two steady depths by a margin, which is the length of the interval.
-        If this margin is not sufficient, the march is repeated with 4 times and then with 16 times the margin.
-        """
-        for widening in (1, 4, 16):
-            marching, found, work = self.begun(widening * self.change)
-            outcome = march_depth(marching, found, work)
-            if outcome != LEFT_LIMITS:
-                return marching, found, work, Outcome(outcome)
-        return marching, found, work, Outcome.DEPTH_NOT_FOUND
-
-    def begun(self, margin: float) -> tuple[Marching, Trajectory, Workspace]:
-        """Return the constants, trajectory and workspace of a march.
-
-        The depth may leave the interval between the steady depths by `margin`. The times are equidistant in
-        log(1 + t / onset). The onset is the time in which the line travels 1 / q_max at the larger of the speeds v_2
-        and v_1 - v_2, but at most one relaxation time.
-        """
-        line, limits, request = self.line, self.limits, self.request
-        assert limits.first is not None
-        assert limits.slower is not None
-        before, after = self.deborah / line.track.cells
-        onset = min(1.0, 1 / (request.wavenumber * max(after, before - after)))
-        if after < before:  # contact grows as sqrt(t), and the first step must not end after the first requested time
-            onset = min(onset, float(request.times[request.times > 0][0]) / (10 ** (1 / request.per_decade) - 1))
-        until = min(request.times[-1], MEMORY)
-        last = np.log1p(until / onset)
-        steps = int(np.ceil(last / np.log(10) * request.per_decade))
-        found = Trajectory(onset * np.expm1(np.linspace(0, last, steps + 1)), *np.empty((4, steps + 1)))
-        found.time[-1] = until  # without rounding error, because a result may be requested at this time
-        for column, value in zip(found[1:], (self.ends[0], limits.rate, limits.at, np.nan), strict=True):
-            column[0] = value
-        low, high = max(self.ends.min() - margin, 0.0), self.ends.max() + margin
-        runs, free_until = _runs(line.track, limits.slower, low, high)
-        begin, end = int(np.ceil(limits.slower.end[0])), int(limits.slower.start[-1])
-        reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
-        # with this limit, the error of Newton's method is of fourth order in the time step
-        close = self.change / request.per_decade**2
-        marching = Marching(
-            line.track, limits.first, reachable, self.deborah[1], self.load, low, high, onset, last / steps, close
-        )
-        return marching, found, workspace_for(limits.first.start.size, line.barriers(self.deborah[1]), free_until)
+    `change` is the change of the steady depth due to the jump. The depth may leave the interval between the steady
+    depths by `margin`. The times are equidistant in log(1 + t / onset). The onset is the time in which the line travels
+    1 / q_max at the larger of the speeds v_2 and v_1 - v_2, but at most one relaxation time.
+    """
+    assert limits.first is not None
+    assert limits.slower is not None
+    before, after = deborah / line.track.cells
+    onset = min(1.0, 1 / (request.wavenumber * max(after, before - after)))
+    if after < before:  # contact grows as sqrt(t), and the first step must not end after the first requested time
+        onset = min(onset, float(request.times[request.times > 0][0]) / (10 ** (1 / request.per_decade) - 1))
+    until = min(request.times[-1], MEMORY)
+    last = np.log1p(until / onset)
+    steps = int(np.ceil(last / np.log(10) * request.per_decade))
+    found = Trajectory(onset * np.expm1(np.linspace(0, last, steps + 1)), *np.empty((4, steps + 1)))
+    found.time[-1] = until  # without rounding error, because a result may be requested at this time
+    ends = limits.depth + line.cells.top  # depths of the highest point
+    for column, value in zip(found[1:], (ends[0], limits.rate, limits.at, np.nan), strict=True):
+        column[0] = value
+    low, high = max(ends.min() - margin, 0.0), ends.max() + margin
+    runs, free_until = _runs(line.track, limits.slower, low, high)
+    begin, end = int(np.ceil(limits.slower.end[0])), int(limits.slower.start[-1])
+    reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
+    # with this limit, the error of Newton's method is of fourth order in the time step
+    close = change / request.per_decade**2
+    marching = Marching(line.track, limits.first, reachable, deborah[1], load, low, high, onset, last / steps, close)
+    return marching, found, workspace_for(limits.first.start.size, line.barriers(deborah[1]), free_until)
 
 
 @jit

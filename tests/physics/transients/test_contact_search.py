@@ -10,7 +10,7 @@ from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import velocity_jump
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.patches import LOAD
-from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation, jump_between
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, jump_between, march
 
 TIMES = np.geomspace(1e-3, 5, 25)
 EVERY_MOMENT = 1000
@@ -28,10 +28,9 @@ def test_every_moment_carries_the_load(ratio: float) -> None:
         (axis.ravel() for axis in np.meshgrid([0.02, 0.2], [3e-4, 5e-3, 0.08, 1.5])),
     )
     numbers, missing = np.column_stack([before, ratio * before]), []
-    limits, request, cells = steady_limits(line, loads, numbers), MarchRequest(TIMES, np.pi * 400, 6), line.track.cells
+    limits, request = steady_limits(line, loads, numbers), MarchRequest(TIMES, np.pi * 400, 6)
     for k in range(loads.size):
-        relaxation = _Relaxation(line, loads[k] * cells, numbers[k] * cells, limits[k], request)
-        marching, found, work, outcome = relaxation.march()
+        marching, found, work, outcome = march(line, loads[k], numbers[k], limits[k], request)
         assert outcome == Outcome.CONVERGED
         for now in range(1, found.time.size):
             searched_afresh(marching, found, now, work)

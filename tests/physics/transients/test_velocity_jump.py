@@ -23,7 +23,7 @@ def line(oversampling: int = OVERSAMPLING) -> tuple[np.ndarray, np.ndarray]:
 
 
 def solved(height, slope, load, deborahs, times, per_decade=24, wavenumber=WAVENUMBER):
-    request = MarchRequest(times, wavenumber, per_decade, 0.0)
+    request = MarchRequest(times, wavenumber, per_decade)
     return velocity_jump(periodic_line(height, slope), load, deborahs, request)
 
 
