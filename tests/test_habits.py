@@ -11,7 +11,7 @@ import pytest
 
 from mdr_dask import campaign, fits, models, plots
 from mdr_dask.campaign.reference import reference_page
-from mdr_dask.cli import cli
+from mdr_dask.cli import cli, main
 from mdr_dask.cli.reference import commands_page
 
 ROOT = Path(__file__).parent.parent
@@ -61,6 +61,13 @@ def test_every_command_has_help_an_example_and_a_place_in_the_docs(name):
     assert f"mdr-dask {name}" in (command.help or "")
     assert all(option.help for option in command.params if isinstance(option, click.Option))
     assert f"## mdr-dask {name}" in (ROOT / "docs/commands.md").read_text()
+
+
+def test_help_lists_the_commands_in_groups(capsys):
+    assert main(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.index("\nstudy:") < printed.index("\nanswers:") < printed.index("\nmore:")
+    assert all(name in printed for name in cli.commands)
 
 
 def test_reference_pages_are_current():

@@ -27,10 +27,25 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
+#: Groups of commands in ``--help``. All other commands are listed last.
+GROUPS = {
+    "study": ("check", "run", "status", "verify"),
+    "answers": ("show", "fit", "master-curve", "plot", "report"),
+}
 
 
 class Commands(click.Group):
-    """The group of all commands."""
+    """A group whose help lists its commands by purpose."""
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write each command of a group with one line of help, and then the names of all other commands."""
+        limit = formatter.width - 20
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(limit)) for name in names])
+        others = [name for name in sorted(self.commands) if not any(name in names for names in GROUPS.values())]
+        with formatter.section("more"):
+            formatter.write_text(f"{', '.join(others)}; each with --help")
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command. Return 0 if a program such as ``head`` stops reading the output."""
