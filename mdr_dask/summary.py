@@ -34,18 +34,9 @@ class Summary(Estimate):
 
 def summary(campaign: Campaign) -> Summary:
     """Summarise a campaign without running it."""
-    require_answers(campaign)
     costs = estimate(campaign)
     lines = (f"{campaign.name}: {campaign.model}", *study_lines(campaign, costs))
     return Summary(**vars(costs), lines=lines, questions=campaign.remarks)
-
-
-def require_answers(campaign: Campaign) -> None:
-    """Raise CampaignError if ``until`` names a fitted constant that no fit of the model gives."""
-    if campaign.replication.answers:
-        from mdr_dask.fits.answers import require_known
-
-        require_known(campaign)
 
 
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:

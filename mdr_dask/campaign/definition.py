@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -104,7 +104,6 @@ class Tolerance:
 
     relative: float = 0.0
     absolute: float = 0.0
-    place: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)
@@ -127,13 +126,11 @@ class Replication:
     at_most: int
     # Largest accepted standard error of the mean of each output.
     until: Mapping[str, Tolerance]
-    # Largest accepted half width of the 95 % interval of each fitted constant. The keys have the form ``fit.constant``.
-    answers: Mapping[str, Tolerance] = field(default_factory=dict)
 
     @property
     def goes_on(self) -> bool:
         """Whether a second round of realisations may follow the first."""
-        return bool(self.until or self.answers)
+        return bool(self.until)
 
 
 @dataclass(frozen=True)

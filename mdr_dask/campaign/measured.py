@@ -270,13 +270,6 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
     return {key: held[key] for key in conditions}
 
 
-def unknowns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the axes of a campaign for which the table of measured points has no column."""
-    readings = _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series)
-    found = [name for series, each in readings if isinstance(each, Measured) for name in _unknown(each, series)]
-    return tuple(dict.fromkeys(found))
-
-
 def _unknown(measured: Measured, series: Series) -> list[str]:
     return [axis.name for axis in series.axes if axis.unit is not None and axis.name not in measured.conditions]
 

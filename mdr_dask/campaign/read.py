@@ -15,7 +15,7 @@ from mdr_dask.campaign.measured import require_readable
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
-from mdr_dask.campaign.tolerances import answers, is_of_fit, tolerances
+from mdr_dask.campaign.tolerances import tolerances
 from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Model
 from mdr_dask.units import to_si
@@ -132,11 +132,8 @@ def _replication(document: Document, spec: CampaignSpec, model: Model[Any], outp
     if wanted.at_least > wanted.at_most:
         what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
         document.report(("realisations", "at_most"), what)
-    path = ("realisations", "until")
-    fitted = {name: given for name, given in wanted.until.items() if is_of_fit(name, model)}
-    of_outputs = {name: given for name, given in wanted.until.items() if name not in fitted}
-    until = tolerances(document, path, of_outputs, model, outputs)
-    return Replication(wanted.at_least, wanted.at_most, until, answers(document, path, fitted))
+    until = tolerances(document, ("realisations", "until"), wanted.until, model, outputs)
+    return Replication(wanted.at_least, wanted.at_most, until)
 
 
 def _check_blocks(document: Document, spec: CampaignSpec, series: tuple[Series, ...]) -> None:

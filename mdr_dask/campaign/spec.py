@@ -39,8 +39,7 @@ class AdaptiveSpec(Parameters):
     at_most: Whole = Field(description="largest number of realisations that a case may get", ge=2)
     until: dict[str, float | str | ToleranceSpec] = Field(
         min_length=1,
-        description="largest accepted standard error of each named output: 1 %, or {relative: 1 %, absolute: 2 um}. A "
-        "fitted constant may also be named: zone_one.alpha: 0.01 is the half width of its 95 % interval",
+        description="largest accepted standard error of each named output: 1 %, or {relative: 1 %, absolute: 2 um}",
     )
 
 

@@ -12,7 +12,7 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path
 from mdr_dask.campaign.spec import RefinedSpec, ToleranceSpec
-from mdr_dask.errors import did_you_mean, similar
+from mdr_dask.errors import did_you_mean
 from mdr_dask.models.base import Model
 from mdr_dask.units import to_si
 
@@ -38,31 +38,6 @@ def tolerances(
             found[name] = tolerance(written, model.output(name).unit)
         except ValueError as error:
             document.report(at, str(error))
-    return found
-
-
-def is_of_fit(name: str, model: Model[Any]) -> bool:
-    """Return whether a name is similar to no output, and so means a fitted constant such as ``zone_one.alpha``."""
-    return not similar(name, [output.name for output in model.outputs])
-
-
-def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants, with keys of the form ``fit.constant``.
-
-    A tolerance with ``%`` is relative to the constant. A number without ``%`` is absolute.
-    """
-    found = {}
-    for name, written in given.items():
-        constant = name if "." in name else f"{name}.{name}"
-        try:
-            wanted = tolerance(written, "1")
-        except ValueError as error:
-            document.report((*path, name), str(error))
-            continue
-        is_part = isinstance(written, ToleranceSpec) or (isinstance(written, str) and "%" in written)
-        place = str(document.key_place((*path, name)))
-        absolute = wanted.absolute if is_part else wanted.relative
-        found[constant] = Tolerance(wanted.relative if is_part else 0.0, absolute, place)
     return found
 
 

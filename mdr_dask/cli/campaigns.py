@@ -136,14 +136,13 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     from mdr_dask.campaign import load
     from mdr_dask.errors import CampaignError
     from mdr_dask.plan import estimate
-    from mdr_dask.summary import axes_rows, costs_row, require_answers, study_lines
+    from mdr_dask.summary import axes_rows, costs_row, study_lines
 
     rows, problems = [], []
     for path in campaigns:
         try:
             with at_work(f"checking {path}"):
                 campaign = load(path)
-                require_answers(campaign)
                 costs = estimate(campaign)
         except CampaignError as error:
             problems += list(error.args)

@@ -62,14 +62,12 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     mdr-dask run campaigns/friction_force.yaml --part 3/8
     """
     from mdr_dask.campaign import load
-    from mdr_dask.summary import require_answers
 
     study = load(campaign)
     url = options["url"] or study.store
     if url.startswith("memory:"):
         raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
     ask(study)
-    require_answers(study)
     if dry_run:
         _print_plan(study, url, form)
         return 0

@@ -15,7 +15,6 @@ import xarray as xr
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
 #: A law holds if the relative deviations of the data from the law are small: rms at most this value, and the largest
@@ -36,9 +35,7 @@ class Fit:
     `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
     realisation, ...), and all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 %
     intervals of the constants (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``.
-    The attrs contain the units. If `apart` is true, `compute` takes one series at a time. `constants` contains the
-    names of all constants that have an interval; a campaign may use these names in ``until``. `constants` is a function
-    of the campaign if the names depend on the campaign.
+    The attrs contain the units. If `apart` is true, `compute` takes one series at a time.
     """
 
     name: str
@@ -46,11 +43,6 @@ class Fit:
     summary: str
     compute: Callable[[Mapping[str, xr.Dataset]], xr.Dataset]
     apart: bool = True
-    constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
-
-    def constants_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the constants that a campaign may name in ``until``."""
-        return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         """Fit a store, and return the results, indexed by the name of the series (``""`` for all series together).

@@ -17,7 +17,7 @@ import xarray as xr
 from scipy.special import gammaincinv
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter, unknowns
+from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import identifiability
 from mdr_dask.fits.base import DOUBTFUL, Fit
@@ -355,6 +355,5 @@ FITS: tuple[Fit, ...] = (
         (),
         "unknown parameters from the table `measured`: the axes of the study that are not columns of this table",
         calibration,
-        constants=unknowns,
     ),
 )

@@ -273,20 +273,17 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
         lambda series: each(series, load_and_velocity_axes, _zone_one, FRICTION),
-        constants=("alpha", "beta"),
     ),
     Fit(
         "plateau",
         MODELS,
         "largest mu / slope over the velocities, compared with sqrt 2 (eq. 3.15)",
         lambda series: each(series, _velocity_axes, _plateau, FRICTION),
-        constants=("plateau", "plateau_of_contact"),
     ),
     Fit(
         "interpolation",
         MODELS,
         "alpha and beta of the law for both zones and regions I to III (eq. 3.17)",
         lambda series: each(series, load_and_velocity_axes, _interpolation, FRICTION),
-        constants=("alpha", "beta"),
     ),
 )

@@ -119,6 +119,5 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "exponent n of mu / (sqrt 2 slope) = (1 + xi^-n)^(-1/n) for rough indenters (eq. 3.40)",
         lambda series: each(series, _indenter_axes, _indenter, FRICTION),
-        constants=("exponent",),
     ),
 )

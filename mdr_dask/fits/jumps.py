@@ -252,20 +252,17 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "numbers of the jump of every case: d_mu_0 v_1 / (dv s), zeta, xi, relaxing part, a and b of rate and state",
         lambda series: each_jump(series, lambda data: [], _kinetics),
-        constants=tuple(NUMBERS),
     ),
     Fit(
         "jump_law",
         MODELS,
         "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) for all cases (eq. 4.11), and its limits 4.9 and 4.10",
         lambda series: each_jump(series, lambda data: [str(dim) for dim in data.dims], _jump_law),
-        constants=("constant", "zeta", "plateau_jump"),
     ),
     Fit(
         "jump_linearity",
         MODELS,
         "zeta and xi against dv / v_1: constant if the jump is proportional to the change of velocity (eq. 4.8)",
         lambda series: each_jump(series, lambda data: dimensions(data, "velocity_change"), _jump_linearity),
-        constants=tuple(TRENDS),
     ),
 )

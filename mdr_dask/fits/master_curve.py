@@ -217,6 +217,5 @@ FITS = (
         "mu(F_N, v) = Q(log F_N + shift(v)), shift = exponent log v (thesis 3.44-3.46)",
         _of_store,
         apart=False,
-        constants=("shift_factor", "vertical_factor", "power_exponent"),
     ),
 )

@@ -297,13 +297,11 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "mu = mu_2 + mu* exp(-b t') for every case: rate b, duration, slip length; law of eqs. 4.13 to 4.15",
         lambda series: each_jump(series, lambda data: [], _relaxation, TRACE),
-        constants=tuple(FIELDS),
     ),
     Fit(
         "rate_power",
         MODELS,
         "b = factor (v_1 tau q_max)^power, below and above v_1 tau q_max = 1 (eq. 4.12)",
         _fit_power,
-        constants=("power",),
     ),
 )

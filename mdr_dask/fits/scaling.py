@@ -299,20 +299,17 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "L_cont / L = factor (F_N / (G h L))^exponent in zone 1, with 1 / (1 + H) by the thesis; mu over eq. 3.12",
         lambda series: each(series, load_and_velocity_axes, _contact_growth, "contact_fraction"),
-        constants=("exponent", "factor", "slope_in_contact", "mu_over_law"),
     ),
     Fit(
         "contact_slope",
         MODELS,
         "rms slope in contact against its length, slope_cont^2 ~ q_max^(2 - 2H) - (2 pi / L_cont)^(2 - 2H) (eq. 3.21)",
         lambda series: each(series, load_and_velocity_axes, _contact_slope, "contact_slope", "contact_fraction"),
-        constants=("factor", "friction_over_slope"),
     ),
     Fit(
         "collapse",
         MODELS,
         "mu = slope_cont(F_N) g(v f(F_N)): the curves of all loads shifted onto one (eqs. 3.22, 3.23)",
         lambda series: each(series, load_and_velocity_axes, _collapse, FRICTION),
-        constants=("horizontal", "vertical"),
     ),
 )

@@ -9,8 +9,7 @@ from __future__ import annotations
 import logging
 import re
 import uuid
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -83,12 +82,6 @@ def attempts(url: str, series: str) -> dict[BlockIndex, int]:
         key = tuple(record["block"])
         found[key] = max(found.get(key, 0), record["attempt"])
     return found
-
-
-def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
-    """Return the number of blocks that each kind of machine has computed."""
-    last = {(name, tuple(r["block"])): r.get("kind") for name in series for r in records(url, name)}
-    return dict(Counter(kind for kind in last.values() if kind is not None))
 
 
 def merge_records(url: str, series: str) -> None:
