@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from mdr_dask.version import __version__
 
 _HOMES = {
-    "Law": ("mdr_dask.fits.interpolant", "Law"),
     "Resources": ("mdr_dask.execute", "Resources"),
     "aggregate": ("mdr_dask.studies", "aggregate"),
     "check": ("mdr_dask.studies", "check"),
@@ -24,12 +23,10 @@ _HOMES = {
 
 if TYPE_CHECKING:
     from mdr_dask.execute import Resources
-    from mdr_dask.fits.interpolant import Law
     from mdr_dask.studies import aggregate, check, fit, master_curve, plot, read, run, table
     from mdr_dask.studies import open_study as open  # noqa: A004
 
 __all__ = [
-    "Law",
     "Resources",
     "__version__",
     "aggregate",

@@ -87,9 +87,7 @@ JUDGES: dict[str, Judge] = {
     "One exponential fits the relaxation; b = 2.4": FromFit(
         "kinetics2014", "relaxation", "example", "fitted_law_holds", ("rate", "integral_rate")
     ),
-    "Jumps are proportional to the change of the velocity, from -20 to +30 %": FromFit(
-        "kinetics2014", "jump_linearity", "jumps", constants=("zeta", "zeta_trend")
-    ),
+    "Jumps are proportional to the change of the velocity, from -20 to +30 %": measures.proportional_jumps,
     "In region I zeta = 1": kinetics("jump_law", "zeta_holds", "zeta"),
     "On the plateau the jump is 0.4 of the slope, times dv / v_1": kinetics(
         "jump_law", "plateau_holds", "plateau_jump"

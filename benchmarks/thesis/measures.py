@@ -7,6 +7,7 @@ import xarray as xr
 from scipy.optimize import brentq, isotonic_regression
 
 from benchmarks.thesis.ledger import Judge, Studies, compared
+from mdr_dask.fits import available
 from mdr_dask.fits.base import law_holds
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.mdr import power_law_contact as contact
@@ -226,6 +227,16 @@ def switching(studies: Studies) -> str:
     one = float(value.sel(rotation_speed=100 * 2 * np.pi / 60, temperature=313.15, method="nearest"))
     word = "no" if one < 0.02 else "approximately"
     return f"{word}: P = {100 * one:.1f} % of one line, {100 * (1 - (1 - one) ** 24):.0f} % of 24 lines side by side"
+
+
+def proportional_jumps(studies: Studies) -> str:
+    """Compare zeta and xi of eq. 4.8 with their means; fit a straight line to zeta against dv / v_1."""
+    found = available("velocity_jump")["kinetics"].results(studies("kinetics2014", ("jumps",)))["jumps"]
+    trend, zeta = np.polyfit(found.velocity_change, found.zeta, 1)
+    departures = np.concatenate([found[name] - found[name].mean() for name in ("zeta", "xi")]) / float(
+        found.zeta.mean()
+    )
+    return compared(f"relative to zeta; zeta = {zeta:.3g} ({trend / zeta:+.2g} dv / v_1)", *departures)
 
 
 def film_ratio(studies: Studies) -> str:

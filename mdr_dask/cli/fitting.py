@@ -154,11 +154,11 @@ def sensitivity(
     look: dict[str, Any],
     form: str | None,
 ) -> None:
-    """Compute which parameters matter for an output: Sobol indices of a sampled study, with 95 % intervals.
+    """Compute which parameters matter for an output: Sobol indices with 95 % intervals.
 
-    The first-order index of a parameter is the fraction of the variance that this parameter explains alone. The total
-    index includes the interactions of the parameter with other parameters. Total indices need a campaign with
-    `sampling: {saltelli: n}`; first-order indices can be computed for every sampled study.
+    The campaign needs `sampling: {saltelli: n}`. The first-order index of a parameter is the fraction of the variance
+    that this parameter explains alone. The total index includes the interactions of the parameter with other
+    parameters.
 
     \b
     mdr-dask sensitivity results/rolling.zarr breakthrough_probability

@@ -187,7 +187,7 @@ def show(
 def law(store: str, output: str, series: str | None, selections: tuple[str, ...], path: Path) -> None:
     """Write an output and its error as a dense table over the axes of the study, for other programs.
 
-    Interpolate the table linearly: with xarray, with mdr_dask.Law, or in your own program.
+    Interpolate the table linearly, with xarray or in your own program.
 
     \b
     mdr-dask law results/quickstart.zarr friction_coefficient -o mu.nc

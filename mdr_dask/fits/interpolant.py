@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.aggregation import aggregate
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, FitError
+from mdr_dask.errors import FitError
 from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic, dense, left_out_error, linear
 from mdr_dask.models.base import Status
-from mdr_dask.units import shown_apart
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
@@ -118,51 +112,3 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
         **kept,
         "comment": "interpolate linearly; valid inside the axes only; errors are half widths of 95 % intervals",
     }
-
-
-class Law:
-    """A law from a file that ``mdr-dask law`` wrote. Call the object like a function to evaluate the law.
-
-    Parameters
-    ----------
-    path : str or Path
-        The netCDF file, or Zarr store.
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        from scipy.interpolate import RegularGridInterpolator
-
-        with xr.open_dataset(path, engine="zarr" if str(path).endswith(".zarr") else None) as opened:
-            self.table = opened.load()
-        self.output = str(next(name for name, array in self.table.items() if "ancillary_variables" in array.attrs))
-        value = self.table[self.output]
-        words = [str(dim) for dim in value.dims if value[dim].dtype.kind not in "fiu"]
-        if words:
-            raise DataError(
-                f"{path}: the axis {words[0]} has words; select one of them when the law is written (--select)"
-            )
-        self.axes = {str(dim): value[dim].to_numpy().astype(np.float64) for dim in value.dims}
-        both = np.stack([value.to_numpy(), self.table[f"{self.output}_error"].to_numpy()], axis=-1)
-        self._interpolate = RegularGridInterpolator(tuple(self.axes.values()), both)
-
-    def __call__(self, **places: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return values and errors (half widths of 95 % intervals) at given values of all axes, in SI units.
-
-        Arrays are broadcast against each other. DataError is raised if a value is outside the range of its axis.
-        """
-        points = np.stack(np.broadcast_arrays(*self._checked(places).values()), axis=-1)
-        found = self._interpolate(points).reshape(*points.shape[:-1], 2)
-        return found[..., 0], found[..., 1]
-
-    def _checked(self, places: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
-        if set(places) != set(self.axes):
-            raise DataError(f"expected {', '.join(self.axes)}, got {', '.join(places) or 'nothing'}")
-        found = {axis: np.asarray(places[axis], dtype=np.float64) for axis in self.axes}
-        for axis, values in found.items():
-            ends = self.axes[axis][[0, -1]]
-            outside = values[~((values >= ends[0]) & (values <= ends[1]))]
-            if outside.size:
-                unit = str(self.table[axis].attrs.get("units", "1"))
-                outlier, low, high = shown_apart(unit, outside.flat[0], *ends)
-                raise DataError(f"expected {axis} from {low} to {high}, got {outlier}")
-        return found

@@ -22,12 +22,11 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, fitted, verdict
+from mdr_dask.fits.base import Fit, verdict
 from mdr_dask.fits.cases import (
     Series,
     Variables,
     constant,
-    dimensions,
     each,
     holds,
     measure,
@@ -199,53 +198,6 @@ def _limit(
     return mean | measure(verdict_name, verdict(stack / stated - 1, count), question)
 
 
-TRENDS = {
-    "zeta": "zeta of eq. 4.8, extrapolated to dv = 0",
-    "zeta_trend": "slope of zeta against dv / v_1, divided by zeta at dv = 0",
-    "xi": "xi of eq. 4.8, extrapolated to dv = 0",
-    "xi_trend": "slope of xi against dv / v_1, divided by zeta at dv = 0",
-}
-
-
-def _jump_linearity(data: xr.Dataset) -> Variables:
-    """Fit straight lines, horizontal by eq. 4.8, to zeta and xi (see `NUMBERS`) against dv / v_1."""
-    if np.unique(data["velocity_change"]).size < 3:
-        sizes = np.unique(data["velocity_change"]).size
-        raise FitError(f"expected jumps dv / v_1 of three sizes or more, got {sizes}")
-    jumps = jumps_of(data)
-    numbers = jumps.numbers()
-    both = np.stack([numbers["zeta"], numbers["xi"]], axis=1)
-    both[~np.isfinite(both)] = np.nan
-    used = np.all(np.isfinite(both[0]), axis=0)
-    both, change, count = both[:, :, used], jumps.change[used], jumps.count(used)
-    if change.size < 3:
-        return holds(f"not tested: {change.size} jumps, three are needed")
-    scale = both[0, 0].mean()
-    flat = fitted(
-        lambda rows: rows.reshape(len(rows), 2, -1).mean(axis=2),
-        lambda rows, constants: rows - np.repeat(constants, change.size, axis=1),
-        both.reshape(len(both), -1) / scale,
-        count,
-    )
-    line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    # by how much the means of zeta and xi change when zeta and xi are shifted by the deviations from these means
-    moved = scale * (flat.constants[len(both) :] - flat.constants[0])
-    level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
-    with np.errstate(divide="ignore", invalid="ignore"):  # the zeta of a resampled row may be zero
-        trend = line[:, :, 1] / line[:, :1, 0]
-    found: Variables = {}
-    for (name, meaning), stack in zip(
-        TRENDS.items(), (level[:, 0], trend[:, 0], level[:, 1], trend[:, 1]), strict=True
-    ):
-        found |= constant(name, stack, count, meaning)
-    sentence = flat.holds(lambda k: f"dv / v_1 = {change[k % change.size]:.2g}, relative to zeta")
-    return (
-        found
-        | measure("rms_error", flat.rms, "rms deviation of zeta and xi from their means, divided by the mean zeta")
-        | holds(sentence)
-    )
-
-
 FITS: tuple[Fit, ...] = (
     Fit(
         "kinetics",
@@ -258,11 +210,5 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) for all cases (eq. 4.11), and its limits 4.9 and 4.10",
         lambda series: each_jump(series, lambda data: [str(dim) for dim in data.dims], _jump_law),
-    ),
-    Fit(
-        "jump_linearity",
-        MODELS,
-        "zeta and xi against dv / v_1: constant if the jump is proportional to the change of velocity (eq. 4.8)",
-        lambda series: each_jump(series, lambda data: dimensions(data, "velocity_change"), _jump_linearity),
     ),
 )

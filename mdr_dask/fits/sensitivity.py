@@ -19,34 +19,24 @@ from mdr_dask.errors import FitError, distinguishable
 
 #: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
-#: Smallest number of base points (in Saltelli's design) or cases from which an index is computed.
+#: Smallest number of base points from which an index is computed, and of cases with a value.
 FEWEST = 16
 
 
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
-    """Return the Sobol indices of an output for every varied input of a sampled study, with 95 % intervals.
+    """Return the Sobol indices of an output for every varied input of Saltelli's design, with 95 % intervals.
 
-    For Saltelli's design, first-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total
-    indices Jansen (1999). Any other design gives first-order indices only. The cases are sorted by an input, and the
-    outputs of neighbouring cases are multiplied (Gamboa et al., Bernoulli 28, 2345 (2022), here with several
-    neighbours).
+    First-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total indices Jansen (1999).
+    An index is computed from the base points for which all required cases succeeded.
 
     The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
-    wide, because points of a Sobol sequence fill space more evenly than random points. In Saltelli's design, an index
-    is computed from the base points for which all required cases succeeded. In other designs, an index is computed from
-    all cases that succeeded.
+    wide, because points of a Sobol sequence fill space more evenly than random points.
     """
     inputs = _inputs(dataset)
     values, left_out = _values(dataset, output)
     values = values - np.nanmean(values)
-    columns = np.array(list(inputs.values()))
-    if _is_saltelli(columns):
-        blocks = values.reshape(len(values), -1, len(inputs) + 2)
-        found = [_with_interval(blocks[:, :, [0, 1, k + 2]], _exchanged) for k in range(len(inputs))]
-    else:
-        known = np.isfinite(values[0])
-        sorted_values = (values[:, known][:, np.argsort(column[known], kind="stable")] for column in columns)
-        found = [_of_neighbours(each) for each in sorted_values]
+    blocks = values.reshape(len(values), -1, len(inputs) + 2)
+    found = [_with_interval(blocks[:, :, [0, 1, k + 2]], _exchanged) for k in range(len(inputs))]
     result = xr.Dataset(coords={"parameter": np.array(list(inputs), dtype=object)})
     for (k, name), (row, suffix) in product(enumerate(("first", "total")), enumerate(("", "_low", "_high"))):
         result[f"{name}{suffix}"] = ("parameter", [one[row, k] for one in found], {"units": "1"})
@@ -58,16 +48,16 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 def _inputs(dataset: xr.Dataset) -> dict[str, FloatArray]:
     if "case" not in dataset.dims:
-        raise FitError(
-            "expected a sampled study, got a grid; give sampling: {saltelli: n}, {sobol: n}, {latin_hypercube: n} or "
-            "a table of cases"
-        )
+        raise FitError("expected a study with sampling: {saltelli: n}, got a grid")
     varied = {name: coord for name, coord in dataset.coords.items() if coord.dims == ("case",) and name != "case"}
     words = [str(name) for name, coord in varied.items() if coord.dtype.kind not in "fiu"]
     if words:
         raise FitError(f"expected numbers for the input {words[0]}, got words: choose one of them with --select")
     found = {str(name): coord.to_numpy().astype(np.float64) for name, coord in varied.items()}
-    return {name: column for name, column in found.items() if np.ptp(column) > 0}
+    varying = {name: column for name, column in found.items() if np.ptp(column) > 0}
+    if not varying or not _is_saltelli(np.array(list(varying.values()))):
+        raise FitError("expected a study with sampling: {saltelli: n}, got another sampling, or a part of a study")
+    return varying
 
 
 def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
@@ -135,28 +125,6 @@ def _exchanged(values: FloatArray) -> FloatArray:
     return found
 
 
-def _of_neighbours(values: FloatArray) -> FloatArray:
-    """Return the first-order and the total index with the ends of the intervals, shape (3, 2). The total index is NaN.
-
-    The first-order index is the mean of an estimate for random points and an estimate for points that fill space
-    evenly, such as a Sobol sequence. The interval extends from the lower end for random points to the upper end for
-    evenly spread points.
-    """
-    (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
-    first = [(without + with_itself) / 2, low, high]
-    return np.stack([first, np.full(3, np.nan)], axis=1)
-
-
-def _neighbours(values: FloatArray) -> FloatArray:
-    """Return two estimates of the first-order index; only the second one uses the product of each point with itself."""
-    most = max(1, int(np.sqrt(values.shape[1]) / 2))
-    own, square = _product(values, values).mean(), values.mean() ** 2
-    near = np.mean([_product(values[:, k:], values[:, :-k]).mean() for k in range(1, most + 1)])
-    both = (own + 2 * most * near) / (1 + 2 * most)
-    found: FloatArray = np.array([near - square, both - square]) / (own - square)
-    return found
-
-
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return indices and the ends of their jackknife intervals, shape (3, indices).
 
@@ -181,8 +149,7 @@ def _jackknife(parts: list[FloatArray]) -> FloatArray:
 
 def _advice(result: xr.Dataset) -> str:
     """Return a sentence on whether the intervals are narrow enough and, if not, how many more cases are needed."""
-    halves = [((result[f"{name}_high"] - result[f"{name}_low"]) / 2).max().item() for name in ("first", "total")]
-    widest = np.nanmax(halves)
+    widest = max(((result[f"{name}_high"] - result[f"{name}_low"]) / 2).max().item() for name in ("first", "total"))
     cases = result.attrs["cases"]
     if widest <= NARROW:
         return f"enough points: every interval is narrower than +-{NARROW:g}"

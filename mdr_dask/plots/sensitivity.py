@@ -19,9 +19,8 @@ def sensitivity(indices: xr.Dataset) -> Figure:
     ticks = [(float(k), name.replace("_", " ")) for k, name in enumerate(inputs)]
     y = Axis("", ticks=ticks, low=-0.6, high=len(inputs) - 0.4, reverse=True)
     panel = Panel(Axis("share of the variance"), y)
-    kinds = [kind for kind in NAMES if indices[kind].notnull().any()]
-    for k, kind in enumerate(kinds):
-        row = np.arange(len(inputs)) + APART * (k - (len(kinds) - 1) / 2)
+    for k, kind in enumerate(NAMES):
+        row = np.arange(len(inputs)) + APART * (k - 0.5)
         share = Mean(indices[kind], indices[f"{kind}_low"], indices[f"{kind}_high"])
         points = columns(indices[[kind]], x=share, y=row)
         panel.traces.append(Trace("curve", points, kind, NAMES[kind], colours.colour(k), "", colours.MARKERS[k]))

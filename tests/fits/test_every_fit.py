@@ -86,7 +86,7 @@ STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
     "jumps of three sizes on a scan": (
         JUMP + SCAN + KELVIN + TWO_SPEEDS + "  velocity_change: [0.1, 0.2, 0.5]\n",
         {"failed": True},
-        {"kinetics", "jump_linearity", "jump_law"},
+        {"kinetics", "jump_law"},
     ),
     "jumps of a Prony series": (JUMP + ROUGH + PRONY + SPEEDS, {}, OF_JUMPS),
     "jumps": (JUMP + ROUGH + KELVIN + SPEEDS, {}, OF_JUMPS | OF_RATES),
@@ -116,8 +116,6 @@ def test_every_fit_gives_constants_or_the_reason(study, tmp_path):
             refused.append(sentence)
             continue
         assert all("law_holds" in result for result in results.values())
-        ends = {str(key)[:-4] for result in results.values() for key in result if str(key).endswith("_low")}
-        assert callable(law.constants) or name == "film_exponents" or ends <= set(law.constants)
         found.add(name)
     assert found == holds
     assert all(sentence.__cause__ is None for sentence in refused), "an internal error of a fit"

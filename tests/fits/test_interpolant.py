@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import mdr_dask
 from mdr_dask.cli import main
-from mdr_dask.errors import DataError, FitError
+from mdr_dask.errors import FitError
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
-from mdr_dask.store import save
 
 FORCE, VELOCITY = np.geomspace(1e-3, 1e2, 20), np.geomspace(1e-4, 1e2, 36)
 SHAPES = {
@@ -64,24 +62,6 @@ def test_the_study_itself_is_in_the_table():
     assert table.mu.attrs["ancillary_variables"] == "mu_error"
 
 
-def test_a_law_of_a_file_takes_many_points_and_refuses_to_extrapolate(tmp_path):
-    save(law(study("friction"), "mu"), tmp_path / "mu.nc")
-    found = mdr_dask.Law(tmp_path / "mu.nc")
-    for end in (0, -1):
-        assert found(force=FORCE[end], velocity=VELOCITY[end])[0] == pytest.approx(
-            SHAPES["friction"][0](FORCE[end], VELOCITY[end])
-        )
-    force, velocity = inside("friction", 100)
-    mu, error = found(force=force[:, None], velocity=velocity)
-    assert mu.shape == error.shape == (100, 100)
-    truth = SHAPES["friction"][0](force[:, None], velocity)
-    assert np.mean(np.abs(mu - truth) <= error) > 0.95
-    with pytest.raises(DataError, match=r"expected velocity from 100 um/s to 100 m/s, got 101 m/s"):
-        found(force=1.0, velocity=[1.0, 101.0])
-    with pytest.raises(DataError, match="expected force, velocity, got force"):
-        found(force=1.0)
-
-
 @pytest.mark.parametrize(
     ("change", "what"),
     [
@@ -105,10 +85,12 @@ def test_the_command(toy, tmp_path, monkeypatch, capsys):
     assert main(["law", "results/a.zarr", "height", "-o", "height.nc"]) == 0
     printed = capsys.readouterr().out
     assert "position: 0.001 m to 1 m" in printed
-    height, error = mdr_dask.Law("height.nc")(slope=1.25, position=0.1)
+    with xr.open_dataset("height.nc") as opened:
+        found = opened.interp(slope=1.25, position=0.1).load()
     mean = xr.open_zarr("results/a.zarr").height.mean("realisation")
-    assert height == pytest.approx(float(mean.sel(slope=1.25).sel(position=0.1, method="nearest")), rel=1e-6)
-    assert error > 0
+    computed = mean.sel(slope=1.25).sel(position=0.1, method="nearest")
+    assert float(found.height) == pytest.approx(float(computed), rel=1e-6)
+    assert found.height_error > 0
     assert main(["law", "results/a.zarr", "height", "-o", "height.csv"]) == 2
 
 

@@ -122,24 +122,6 @@ def test_limits_of_the_jump() -> None:
     assert only["plateau_holds"].item() == "not tested: no case in this region"
 
 
-def test_jumps_proportional_to_the_change_are_linear_and_others_are_not() -> None:
-    changes = [-0.2, 0.1, 0.3]
-    data = axes(store(ABOVE[2:4], 0.7, 0.3), "velocity_change", changes)
-    for name in ("before", "jump", "after"):
-        data[f"friction_coefficient_{name}"] = data[f"friction_coefficient_{name}"].copy()
-    change = data["velocity_change"]
-    before = data["friction_coefficient_before"]
-    for bend, word in ((0.0, "yes"), (2.0, "no")):
-        jump = 0.9 * before * change * (1 + bend * change)
-        planted = data.assign(friction_coefficient_jump=jump, friction_coefficient_after=before + 0.8 * jump)
-        found = FIT["jump_linearity"].compute({"": planted})
-        assert np.all(found["law_holds"].str.startswith(word))
-        np.testing.assert_allclose(found["zeta"], 0.9, rtol=0.02)
-        np.testing.assert_allclose(found["zeta_trend"], bend, atol=0.05)
-    with pytest.raises(FitError, match="three sizes"):
-        FIT["jump_linearity"].compute({"": data.isel(velocity_change=slice(2))})
-
-
 def test_power_of_the_rate_in_both_regimes() -> None:
     below = np.geomspace(1e-5, 5e-4, 5)
     powers = FIT["rate_power"].results(

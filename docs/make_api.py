@@ -1,4 +1,4 @@
-"""Write the reference of the public functions from docstrings: ``python -m mdr_dask.api > docs/api.md``."""
+"""Write the reference of the public functions from docstrings: ``python docs/make_api.py > docs/api.md``."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 _HEAD = """\
 # Python reference
 
-Made by `python -m mdr_dask.api > docs/api.md`; do not edit. [Python](python.md) shows how to run a study. The functions
-of the physics take and return numpy arrays in the units that each of them states. All examples are tested.
+Made by `python docs/make_api.py > docs/api.md`; do not edit. [Python](python.md) shows how to run a study. The
+functions of the physics take and return numpy arrays in the units that each of them states. All examples are tested.
 """
 
 #: For each subject and module, the names of public functions and classes, separated by blanks.
