@@ -182,8 +182,6 @@ def slopes(_: Studies) -> str:
 
 def shifts(studies: Studies) -> str:
     """Compare fitted shifts along the velocity with those of the interpolation law."""
-    from mdr_dask.fits import available
-
     (found,) = available("sliding_friction")["collapse"].results(studies("friction_force")).values()
     apart = (found.horizontal - found.horizontal_stated).to_numpy().ravel()
     return compared(f"at most {np.nanmax(np.abs(apart)):.2f} decades", *(np.log(10) * apart[np.isfinite(apart)]))

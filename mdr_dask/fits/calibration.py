@@ -19,11 +19,26 @@ from scipy.special import gammaincinv
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fits import identifiability
 from mdr_dask.fits.base import DOUBTFUL, Fit
 from mdr_dask.fits.interpolation import FEWEST
 from mdr_dask.fits.misfit import Residuals, law_holds
-from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, likelihood, posterior
+from mdr_dask.fits.posterior import (
+    CUT,
+    DEVIATIONS,
+    OPEN,
+    Noise,
+    Posterior,
+    Product,
+    at_ends,
+    distance,
+    intervals,
+    likelihood,
+    posterior,
+    products,
+    undetermined,
+    unit_of,
+    written,
+)
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.models.numbers import least_of
 from mdr_dask.tables import decoded
@@ -63,25 +78,23 @@ class Calibration:
 
     @cached_property
     def ends(self) -> BoolArray:
-        """For each unknown, whether the lower and the upper end of its axis are open (see `identifiability.OPEN`)."""
-        return identifiability.at_ends(self.posterior) > -identifiability.OPEN
+        """For each unknown, whether the lower and the upper end of its axis are open (see `OPEN`)."""
+        return at_ends(self.posterior) > -OPEN
 
     @cached_property
     def free(self) -> list[int]:
         """Indices of the unknowns that the data do not determine."""
-        return identifiability.undetermined(self.posterior, self.ends)
+        return undetermined(self.posterior, self.ends)
 
     @cached_property
-    def products(self) -> list[identifiability.Product]:
+    def products(self) -> list[Product]:
         """Products of powers of undetermined unknowns; the data determine the products, but not the unknowns."""
-        return identifiability.products(self.posterior, self.values, self.free)
+        return products(self.posterior, self.values, self.free)
 
-    def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
+    def name_and_unit(self, product: Product) -> tuple[str, str]:
         """Return a product as text, and the unit of the product."""
         units = [self.units[name] for name in self.unknowns]
-        return identifiability.written(self.unknowns, product.exponents), identifiability.unit_of(
-            units, product.exponents
-        )
+        return written(self.unknowns, product.exponents), unit_of(units, product.exponents)
 
     @cached_property
     def residuals(self) -> Residuals:
@@ -251,13 +264,13 @@ def summary(found: Calibration) -> xr.Dataset:
     variables: dict[str, tuple[tuple[()], object, dict[str, str]]] = {}
     for k, name in enumerate(found.unknowns):
         attributes = {"units": found.units[name], "long_name": name.replace("_", " ")}
-        ends = _intervals(found.values[:, k], found.posterior.weights)
+        ends = intervals(found.values[:, k], found.posterior.weights)
         if k in found.free:
             ends = dict.fromkeys(ends, np.nan) | _bound(found, k)
         variables |= {name + end: ((), value, attributes) for end, value in ends.items()}
     for product in found.products:
         name, unit = found.name_and_unit(product)
-        ends = _intervals(product.values, found.posterior.weights)
+        ends = intervals(product.values, found.posterior.weights)
         variables |= {name + end: ((), value, {"units": unit, "long_name": name}) for end, value in ends.items()}
     pure = {"units": "1"}
     for one, other in combinations((k for k in range(len(found.unknowns)) if k not in found.free), 2):
@@ -284,16 +297,6 @@ def summary(found: Calibration) -> xr.Dataset:
     return xr.Dataset(variables, attrs=counts)
 
 
-def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
-    return dict(
-        zip(
-            identifiability.ENDS,
-            identifiability.quantiles(values, weights, identifiability.SHARES).tolist(),
-            strict=True,
-        )
-    )
-
-
 def _bound(found: Calibration, k: int) -> dict[str, float]:
     """Return the ends of the one-sided interval of unknown `k`.
 
@@ -302,7 +305,7 @@ def _bound(found: Calibration, k: int) -> dict[str, float]:
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}
-    likely = found.values[found.posterior.density > found.posterior.density.max() - identifiability.OPEN, k]
+    likely = found.values[found.posterior.density > found.posterior.density.max() - OPEN, k]
     return {"_low": float(likely.min()), "_high": np.inf} if high else {"_low": -np.inf, "_high": float(likely.max())}
 
 
@@ -324,7 +327,7 @@ def sentence(found: Calibration) -> str:
     known = [name for name in found.unknowns if name not in free]
     for product in found.products:
         name, unit = found.name_and_unit(product)
-        ends = _intervals(product.values, found.posterior.weights)
+        ends = intervals(product.values, found.posterior.weights)
         half = (ends["_high"] - ends["_low"]) / 2 / ends[""]
         known.append(f"{name} ({ends['']:.3g}{'' if unit == '1' else ' ' + unit} +- {100 * half:.2g} %)")
     only = f"only {' and '.join(known)} {'is' if len(known) == 1 else 'are'} determined; " if known else ""
@@ -338,8 +341,8 @@ def sentence(found: Calibration) -> str:
 
 
 def _cut(found: Calibration) -> str:
-    """Return a text that names the determined unknowns whose axis cuts off the interval (`identifiability.CUT`)."""
-    is_high = identifiability.at_ends(found.posterior) > -identifiability.CUT
+    """Return a text that names the determined unknowns whose axis cuts off the interval (`CUT`)."""
+    is_high = at_ends(found.posterior) > -CUT
     cut = [
         f"{name} at {shown(float(axis[end]), found.units[name])}"
         for k, (name, axis) in enumerate(found.prediction.unknowns.items())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits import calibration as fit
-from mdr_dask.fits import identifiability
+from mdr_dask.fits import posterior
 from mdr_dask.plots import colours, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
@@ -150,7 +150,7 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
         )
         centres, density = across[first], np.bincount(cell, weights)
     else:
-        ends = identifiability.quantiles(across, weights, [1e-4, 1 - 1e-4])
+        ends = posterior.quantiles(across, weights, [1e-4, 1 - 1e-4])
         density, edges = np.histogram(across, np.histogram_bin_edges(across, "sturges", tuple(ends)), weights=weights)
         centres = (edges[1:] + edges[:-1]) / 2
     height, back = density / density.max(), np.exp if log else np.asarray
@@ -161,13 +161,13 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
     if is_free:
         panel.title = "not determined"
         return panel
-    for level in identifiability.LEVELS.values():
-        low, high = identifiability.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
+    for level in posterior.LEVELS.values():
+        low, high = posterior.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
         inside = np.concatenate([[low], centres[(centres > low) & (centres < high)], [high]])
         below = np.interp(inside, centres, height)
         shade = columns(x=back(inside), y=Mean(below, np.zeros(inside.size), below))
         panel.traces.append(Trace("band", shade, f"{level:.0%} of {name}", "", colour))
-    low, middle, high = back(identifiability.quantiles(across, weights, [0.025, 0.5, 0.975]))
+    low, middle, high = back(posterior.quantiles(across, weights, [0.025, 0.5, 0.975]))
     panel.title = f"{middle:.3g} ({low:.3g}, {high:.3g}) {labels.printed_unit(how.unit)}".strip()
     return panel
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.fits.identifiability import products
-from mdr_dask.fits.posterior import Posterior
+from mdr_dask.fits.posterior import Posterior, products
 
 
 def posterior(likely, unknowns):
