@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -16,9 +16,6 @@ from mdr_dask.campaign.measured import Measured, belonging
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown_apart
-
-if TYPE_CHECKING:
-    from scipy.interpolate import RegularGridInterpolator
 
 #: Relative difference up to which a measured and a computed value of a parameter count as equal. If the study has too
 #: few values for an interpolation, `AGREE` is used.
@@ -53,8 +50,8 @@ class Prediction:
     unknowns: Mapping[str, FloatArray]
     realisations: int
     logarithmic: bool
-    _mean: RegularGridInterpolator
-    _errors: RegularGridInterpolator
+    _mean: Callable[[FloatArray], FloatArray]
+    _errors: Callable[[FloatArray], FloatArray]
 
     @property
     def scales(self) -> list[Scale]:
