@@ -231,10 +231,10 @@ def proportional_jumps(studies: Studies) -> str:
     """Compare zeta and xi of eq. 4.8 with their means; fit a straight line to zeta against dv / v_1."""
     found = available("velocity_jump")["kinetics"].results(studies("kinetics2014", ("jumps",)))["jumps"]
     trend, zeta = np.polyfit(found.velocity_change, found.zeta, 1)
-    departures = np.concatenate([found[name] - found[name].mean() for name in ("zeta", "xi")]) / float(
-        found.zeta.mean()
-    )
-    return compared(f"relative to zeta; zeta = {zeta:.3g} ({trend / zeta:+.2g} dv / v_1)", *departures)
+    away = [found[name] - found[name].mean() for name in ("zeta", "xi")]
+    departures = np.concatenate(away) / found.zeta.mean().item()
+    sign = "-" if trend < 0 else "+"
+    return compared(f"zeta = {zeta:.3g} (1 {sign} {abs(trend / zeta):.2g} dv / v_1)", *departures)
 
 
 def film_ratio(studies: Studies) -> str:
