@@ -1,7 +1,7 @@
 """The posterior density of a few unknowns, and which unknowns or products of unknowns it determines.
 
-The range of each unknown, on the scale of its axis, is mapped to the interval from 0 to 1. The unit cube is divided into
-cells, and cells of high density are divided further.
+The range of each unknown, on the scale of its axis, is mapped to the interval from 0 to 1. The unit cube is divided
+into cells, and cells of high density are divided further.
 """
 
 from __future__ import annotations
