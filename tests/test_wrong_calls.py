@@ -34,7 +34,7 @@ WRONG = [
     # values
     ("show STORE --select velocity=1kg", "velocity: ", "'1 mm/s'", "'1kg'"),
     ("show STORE --where velocity>1kg -o new/x.zarr", "'velocity>1kg'"),
-    ("sensitivity STORE friction_coefficient -o new/x.png", "sampled"),
+    ("sensitivity STORE friction_coefficient -o new/x.png", "saltelli"),
     # files that are read
     ("check nowhere.yaml", "nowhere.yaml"),
     ("run large.yaml --store new/x.zarr", "large.yaml: ", "memory"),
