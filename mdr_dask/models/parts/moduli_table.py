@@ -26,8 +26,6 @@ _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNOREC
 #: Columns that determine storage and loss modulus.
 WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
 SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this value count as equal
-#: Gap in decades between the moduli of neighbouring curves. The scatter of an instrument can explain smaller gaps.
-APART = 0.02
 
 
 class ModulusTable(NamedByFile):
@@ -198,7 +196,6 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
             f"{chosen.file.name}: expected a reference between {shown(levels[0], 'K')} and {shown(levels[-1], 'K')}, "
             f"got {shown(chosen.reference, 'K')}"
         )
-    _require_overlap(np.array([storage, loss]), member, levels)
     x, y = np.log10(omega), np.log10([storage, loss])
     parts = [member == number for number in range(levels.size)]
     free = superpose(levels, [(x[part], y[:, part]) for part in parts], chosen.vertical)
@@ -227,30 +224,6 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
         f", whose shift factors differ from the given ones by up to {apart[worst]:.2g} decades (at "
         f"{shown(levels[worst], 'K')})"
     )
-
-
-def _require_overlap(moduli: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Raise DataError if a gap in both `moduli`, shape (2, rows), separates some curves from all other curves.
-
-    No horizontal shift can close such a gap.
-    """
-    low, high = (
-        np.array([find(moduli[:, member == number], axis=1) for number in range(levels.size)]).T
-        for find in (np.min, np.max)
-    )
-    gap = np.log10(low[:, :, None] / high[:, None])  # gaps in both moduli, for all pairs of curves
-    apart = np.all(np.maximum(gap, gap.transpose(0, 2, 1)) > APART, axis=0)
-    order = np.argsort(low[0])
-    for place in range(1, order.size):
-        softer, stiffer = order[:place], order[place:]
-        if apart[np.ix_(softer, stiffer)].all():
-            below, above = softer[np.argmax(high[0, softer])], stiffer[0]
-            raise DataError(
-                f"the curves do not overlap: the storage modulus reaches {shown(high[0, below], 'Pa')} at "
-                f"{shown(levels[below], 'K')} and begins at {shown(low[0, above], 'Pa')} at {shown(levels[above], 'K')}"
-                ", and there is a gap in the loss modulus too: measure in between, or give the shift factors (wlf, "
-                "arrhenius or shift_factors, and no reference)"
-            )
 
 
 def moduli_of(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -17,11 +17,17 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, cho_solve_banded, cholesky_banded, solve_banded
 from scipy.special import softmax
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.superposition.banded import Factors, drawn, solve_rows
+from mdr_dask.physics.jit import jit
+
+ORDER = 4
+"""Number of cubic B-splines that overlap at a point."""
+
+JITTER = 1e-14
+"""Relative increase of the diagonal of a precision matrix, above the rounding errors of the banded factorisation."""
 
 CELLS = 8
 """Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
@@ -91,8 +97,8 @@ class Curves:
         """Return the spline of a channel at the abscissae `grid`, shape (rows, grid)."""
         low = self.begin(self.x + shifts[:, self.member])[:, None]
         first, value, _ = _basis((grid - low) * CELLS, self.splines)
-        places = channel * self.splines + first[..., None] + np.arange(4)
-        return np.asarray(np.sum(value * unknowns[np.arange(len(unknowns))[:, None, None], places], axis=2))
+        places = channel * self.splines + first[..., None] + np.arange(ORDER)
+        return np.asarray(np.vecdot(value, unknowns[np.arange(len(unknowns))[:, None, None], places]))
 
     @cached_property
     def tied(self) -> FloatArray:
@@ -131,22 +137,37 @@ class Solved:
     """Density of the parameters, and distribution of the spline coefficients and offsets, for each row of parameters.
 
     `energy` is the negative logarithm of the density, up to a constant. `mean` contains the mean coefficients of the
-    splines, channel by channel, then the offsets; `factors` are the Cholesky factors of the precision matrix of these
-    unknowns.
+    splines, channel by channel, then the offsets. `factor`, `gain` and `covariance` are U, G and C of `solve`.
     """
 
     energy: FloatArray
     gradient: FloatArray
     mean: FloatArray
-    factors: Factors
+    factor: FloatArray
+    gain: FloatArray
+    covariance: FloatArray
 
     def unknowns(self, generator: np.random.Generator) -> FloatArray:
         """Return one draw of coefficients and offsets for each row, shape (rows, unknowns)."""
-        return self.mean + drawn(self.factors, generator.standard_normal(self.mean.shape))
+        many, coefficients, _ = self.gain.shape
+        normal = generator.standard_normal(self.mean.shape)
+        offsets = np.linalg.cholesky(self.covariance) @ normal[:, coefficients:, None]
+        free = solve_banded((0, ORDER - 1), self.factor, normal[:, :coefficients].ravel()).reshape(many, -1, 1)
+        return np.asarray(self.mean + np.concatenate([free - self.gain @ offsets, offsets], axis=1)[..., 0])
 
 
 def solve(curves: Curves, rows: FloatArray) -> Solved:
     """Return density, gradient and spline coefficients for each row of parameters (see `Curves.prior`).
+
+    The unknowns of a row are the spline coefficients of all channels and the offsets. Their precision matrix is
+
+        [ A    B ]
+        [ B^T  D ],
+
+    with G = A^-1 B, the covariance C = (D - B^T G)^-1 of the offsets, and the covariance A^-1 + G C G^T of the
+    coefficients. Four splines overlap at a point; therefore A is banded. The matrices A of all rows are the diagonal
+    blocks of one banded matrix, which is factorised into U^T U. Banded matrices M are stored by diagonals:
+    ``band[d, k]`` is M[k - d, k].
 
     The gradient neglects that the knots of the splines move with the curves, because this movement hardly changes the
     density.
@@ -156,48 +177,116 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     lines, bends = count - 1, channels * count
     middle, known = curves.prior
     away = rows - middle
+    # the limits keep all numbers finite if a chain diverges
     logs = middle[lines:] + np.clip(away[:, lines:], -FARTHEST, FARTHEST)
+    shifts = np.pad(np.clip(rows[:, :lines], -FARTHEST * count, FARTHEST * count), ((0, 0), (1, 0)))
     near = logs[:, :bends].reshape(many, channels, count)
     noise = np.exp(logs[:, bends : bends + channels])
-    shifts = np.concatenate([np.zeros((many, 1)), rows[:, :lines]], axis=1)
-
     moved = curves.x + shifts[:, curves.member]
     low = curves.begin(moved)[:, None]
     first, value, slope = _basis((moved - low) * CELLS, splines)
     apart = (low + np.arange(splines - 2) / CELLS)[..., None] - (curves.centre + shifts)[:, None]
     share = softmax(-0.5 * (apart / REACH) ** 2, axis=2)
-    bend = np.einsum("wjk,wck->wcj", share, near)
-    stiffness, weight = np.exp(-2 * bend), 1 / (noise**2 + ROUNDING**2)
-    tied = np.zeros((many, 0, 0))
-    if offsets:
-        tied = curves.tied * np.exp(-2 * logs[:, -1, None, None])
-    factors, linear = solve_rows(first, value, slope, curves.member, curves.y, weight, stiffness, tied)
+    bend = near @ share.swapaxes(1, 2)
+    weight = 1 / (noise**2 + ROUNDING**2)
 
-    left, by_bend = curves.y - linear.fitted, 1 - linear.rough * stiffness
-    squares = np.sum(left**2 + linear.variance, axis=2)
-    change = share[:, None] * (near[:, :, None] - bend[..., None]) * (apart / REACH**2)[:, None]
-    turn = np.einsum("wc,wcp->wp", weight, linear.tilt - left * linear.slope)
-    by_place = np.einsum("wcj,wcjk->wk", by_bend, change)
-    # at the mean coefficients, the exponent of the density is minus half the sum of weight * residual * ordinate
-    energy = 0.5 * linear.log_determinant + 0.5 * np.sum(weight * np.sum(left * curves.y, axis=2), axis=1)
-    energy += np.sum(bend, axis=(1, 2)) - 0.5 * points * np.sum(np.log(weight), axis=1)
-    gradient = np.zeros_like(rows)
-    gradient[:, :lines] = (turn * CELLS @ np.eye(count)[curves.member] + by_place)[:, 1:]
-    gradient[:, lines : lines + bends] = np.einsum("wcj,wjk->wck", by_bend, share).reshape(many, bends)
-    gradient[:, lines + bends : lines + bends + channels] = (points / weight - squares) * (weight * noise) ** 2
+    # the data of a channel are its points, and the second differences of its coefficients, which are zero
+    bent = np.array([[1.0, -2.0, 1.0, 0.0]] * (splines - 3) + [[0.0, 1.0, -2.0, 1.0]])
+    first = np.hstack([first, np.tile(np.minimum(np.arange(splines - 2), splines - ORDER), (many, 1))])
+    value = np.concatenate([value, np.tile(bent, (many, 1, 1))], axis=1)[:, None]
+    target = np.pad(curves.y, ((0, 0), (0, splines - 2)))
+    precision = np.concatenate([np.repeat(weight[..., None], points, axis=2), np.exp(-2 * bend)], axis=2)
+    blocks = splines * np.arange(many * channels).reshape(many, channels, 1, 1)
+    at = blocks + first[:, None, :, None] + np.arange(ORDER)  # the four coefficients that determine each datum
+    ties = at[:, :, :points] * count + curves.member[:, None]  # these coefficients and the offset of a point
+    weighted = precision[..., None] * value
+
+    def total(places: IntArray, values: FloatArray, columns: int = 1) -> FloatArray:
+        summed = np.bincount(places.ravel(), values.ravel(), many * channels * splines * columns)
+        return np.asarray(summed, dtype=np.float64)
+
+    band = np.array([total(at[..., d:], weighted[..., d:] * value[..., : ORDER - d]) for d in range(ORDER)])
+    band[0] *= 1 + JITTER
+    sides = total(at, weighted * target[..., None])[:, None]
+    of_offsets, tied = np.zeros((many, 0)), np.zeros((many, 0, 0))
+    corner = tied
     if offsets:
-        found = linear.mean[:, -offsets:]
-        squared = found[:, :, None] * found[:, None] + linear.offsets
-        energy += offsets * logs[:, -1]
-        gradient[:, -1] = offsets - np.sum(squared * tied, axis=(1, 2))
+        sides = np.hstack([sides, -total(ties, weighted[:, :, :points], count).reshape(-1, count)])
+        of_offsets = -weight @ curves.y @ np.eye(count)[curves.member]
+        tied = curves.tied * np.exp(-2 * logs[:, -1, None, None])
+        corner = tied + np.sum(weight, axis=1)[:, None, None] * np.diag(np.bincount(curves.member))
+    factor = cholesky_banded(band[::-1], check_finite=False)
+    solved = cho_solve_banded((factor, False), sides, check_finite=False)
+    solved, sides = (each.reshape(many, channels * splines, 1 + offsets) for each in (solved, sides))
+    alone, gain, border = solved[..., :1], solved[..., 1:], sides[..., 1:].swapaxes(1, 2)
+    corner = corner - border @ gain
+    covariance = np.asarray(np.linalg.inv(corner), dtype=np.float64)
+    found = covariance @ (of_offsets[..., None] - border @ alone)
+    mean, found = (alone - gain @ found)[..., 0], found[..., 0]
+    log_determinant = 2 * np.sum(np.log(factor[-1]).reshape(many, -1), axis=1) + np.linalg.slogdet(corner)[1]
+
+    # covariance of the coefficients near its diagonal, and minus the covariance of coefficients and offsets
+    within, cross = _inverse_band(factor[::-1]).reshape(ORDER, many, -1), gain @ covariance
+    for d in range(ORDER):
+        within[d, :, d:] += np.vecdot(cross[:, d:], gain[:, : gain.shape[1] - d])
+
+    # residual of each datum and its variance; at each point, slope of the curve, and covariance of slope and residual
+    own, slope, inner = np.take(mean, at), slope[:, None], slice(points)
+    left, steep = target - np.vecdot(value, own), np.vecdot(slope, own[:, :, inner])
+    variance, tilt = np.zeros_like(left), np.zeros_like(steep)
+    for d in range(ORDER):
+        near_by = np.take(within[d], at[..., d:])
+        one, other = value[..., d:] * near_by, value[..., : ORDER - d] * near_by
+        variance += (1 + (d > 0)) * np.vecdot(one, value[..., : ORDER - d])
+        tilt += np.vecdot(slope[..., d:], other[:, :, inner])
+        if d:
+            tilt += np.vecdot(slope[..., : ORDER - d], one[:, :, inner])
+    if offsets:
+        tie = np.take(cross, ties)
+        left[:, :, inner] += found[:, None, curves.member]
+        variance[:, :, inner] += np.diagonal(covariance, axis1=1, axis2=2)[:, None, curves.member]
+        variance[:, :, inner] += 2 * np.vecdot(value[:, :, inner], tie)
+        tilt += np.vecdot(slope, tie)
+
+    # at the mean coefficients, the exponent of the density is minus half the sum of precision * residual * datum
     pull = away @ known
-    return Solved(energy + 0.5 * np.sum(pull * away, axis=1), gradient + pull, linear.mean, factors)
+    energy = 0.5 * (log_determinant + np.sum(precision * left * target - np.log(precision), axis=(1, 2)))
+    energy += 0.5 * np.sum(pull * away, axis=1)
+    by_scale = 1 - precision * (
+        left**2 + variance
+    )  # derivative by the logarithm of the standard deviation of each datum
+    by_bend, lever = by_scale[..., points:], share * apart / REACH**2
+    turn = np.sum(weight[..., None] * (tilt - left[:, :, inner] * steep), axis=1)
+    by_shift = CELLS * turn @ np.eye(count)[curves.member]
+    by_shift += np.sum(near * (by_bend @ lever) - (by_bend * bend) @ lever, axis=1)
+    by_noise = np.sum(by_scale[:, :, inner], axis=2) * weight * noise**2
+    gradient = [by_shift[:, 1:], (by_bend @ share).reshape(many, bends), by_noise]
+    if offsets:
+        energy += offsets * logs[:, -1]
+        squares = found[:, :, None] * found[:, None] + covariance
+        gradient.append(offsets - np.sum(squares * tied, axis=(1, 2))[:, None])
+    mean = np.hstack([mean, found])
+    return Solved(energy, np.hstack(gradient) + pull, mean, factor, gain, covariance)
+
+
+@jit
+def _inverse_band(factor: FloatArray) -> FloatArray:
+    """Return the band of the inverse of U^T U by the recursion of Takahashi, Fagan and Chin (1973)."""
+    width, size = factor.shape
+    inverse = np.zeros((width, size))
+    for j in range(size - 1, -1, -1):
+        last = min(j + width, size) - 1
+        for i in range(last, j - 1, -1):
+            rest = 1 / factor[0, j] if i == j else 0.0
+            for k in range(j + 1, last + 1):
+                rest -= inverse[abs(i - k), max(i, k)] * factor[k - j, k]
+            inverse[i - j, i] = rest / factor[0, j]
+    return inverse
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the first of the four splines at each position (in cells), and values and slopes of all four splines."""
-    # in a diverged row, positions may be NaN or infinite; such positions must not become indices
-    first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
+    first = np.clip(np.floor(place), 0, splines - ORDER).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     slope = _SLOPES(inside)
     return first, _VALUES(inside) + (place - first - inside)[..., None] * slope, slope
