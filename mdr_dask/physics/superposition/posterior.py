@@ -26,8 +26,11 @@ from mdr_dask.physics.jit import jit
 ORDER = 4
 """Number of cubic B-splines that overlap at a point."""
 
-JITTER = 1e-14
-"""Relative increase of the diagonal of a precision matrix, above the rounding errors of the banded factorisation."""
+JITTER = 20 * float(np.finfo(np.float64).eps)
+"""Relative increase of the diagonal of a precision matrix, larger than the rounding errors of its factorisation.
+
+A row of a band has 7 entries, each with up to 5 rounding errors of half an eps.
+"""
 
 CELLS = 8
 """Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
