@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.linalg import block_diag, cho_solve_banded, cholesky_banded, solve_banded
 from scipy.special import softmax
 
@@ -131,8 +130,9 @@ class Curves:
         return np.concatenate(means), block_diag(step_precision(self.count), *[bends] * channels, widths)
 
 
-_VALUES = BSpline(np.arange(-3.0, 5.0), np.eye(4), 3)  # the four cubic B-splines that overlap on a cell of width 1
-_SLOPES = _VALUES.derivative()
+# coefficients of the four cubic B-splines that overlap on a cell; one row for each power of the position in the cell
+_VALUES = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
+_SLOPES = np.arange(1, ORDER)[:, None] * _VALUES[1:]
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,6 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     precision = np.concatenate([np.repeat(weight[..., None], points, axis=2), np.exp(-2 * bend)], axis=2)
     blocks = splines * np.arange(many * channels).reshape(many, channels, 1, 1)
     at = blocks + first[:, None, :, None] + np.arange(ORDER)  # the four coefficients that determine each datum
-    ties = at[:, :, :points] * count + curves.member[:, None]  # these coefficients and the offset of a point
     weighted = precision[..., None] * value
 
     def total(places: IntArray, values: FloatArray, columns: int = 1) -> FloatArray:
@@ -214,6 +213,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     of_offsets, tied = np.zeros((many, 0)), np.zeros((many, 0, 0))
     corner = tied
     if offsets:
+        ties = at[:, :, :points] * count + curves.member[:, None]  # coefficients and offset of each point
         sides = np.hstack([sides, -total(ties, weighted[:, :, :points], count).reshape(-1, count)])
         of_offsets = -weight @ curves.y @ np.eye(count)[curves.member]
         tied = curves.tied * np.exp(-2 * logs[:, -1, None, None])
@@ -291,8 +291,9 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
     """Return the first of the four splines at each position (in cells), and values and slopes of all four splines."""
     first = np.clip(np.floor(place), 0, splines - ORDER).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
-    slope = _SLOPES(inside)
-    return first, _VALUES(inside) + (place - first - inside)[..., None] * slope, slope
+    powers = np.vander(inside.ravel(), ORDER, increasing=True).reshape(*inside.shape, ORDER)
+    slope = powers[..., :-1] @ _SLOPES
+    return first, powers @ _VALUES + (place - first - inside)[..., None] * slope, slope
 
 
 def step_precision(count: int) -> FloatArray:
