@@ -189,9 +189,9 @@ def test_master_curves_do_not_depend_on_units_and_order(seed, points, noise, alo
         assert one is two
         return
     assert np.array_equal(two.groups, one.groups)
-    # draws of chains that begin apart: together to a few hundredths of the error that is stated, unless the chains
-    # wander along a plateau
-    close = (1.0 if one.undetermined else 3e-2) * np.maximum(one.horizontal_error, 1e-6) + 1e-7
+    # rounding may lead to other draws: the means of 480 draws then differ by some tenths of the stated error, and more
+    # if the chains wander along a plateau
+    close = (1.0 if one.undetermined else 0.3) * np.maximum(one.horizontal_error, 1e-6) + 1e-7
     assert np.all(np.abs(two.horizontal - one.horizontal) <= close)
     assert np.all(np.abs(two.vertical - one.vertical) <= close)
 

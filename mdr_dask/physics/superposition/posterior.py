@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag, cho_solve_banded, cholesky_banded, solve_banded
+from scipy.linalg import LinAlgError, block_diag, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
 from scipy.special import softmax
 
 from mdr_dask.arrays import FloatArray, IntArray
@@ -24,12 +25,6 @@ from mdr_dask.physics.jit import jit
 
 ORDER = 4
 """Number of cubic B-splines that overlap at a point."""
-
-JITTER = 20 * float(np.finfo(np.float64).eps)
-"""Relative increase of the diagonal of a precision matrix, larger than the rounding errors of its factorisation.
-
-A row of a band has 7 entries, each with up to 5 rounding errors of half an eps.
-"""
 
 CELLS = 8
 """Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
@@ -155,7 +150,7 @@ class Solved:
         many, coefficients, _ = self.gain.shape
         normal = generator.standard_normal(self.mean.shape)
         offsets = np.linalg.cholesky(self.covariance) @ normal[:, coefficients:, None]
-        free = solve_banded((0, ORDER - 1), self.factor, normal[:, :coefficients].ravel()).reshape(many, -1, 1)
+        free = dtbtrs(self.factor, normal[:, :coefficients].reshape(-1, 1))[0].reshape(many, -1, 1)
         return np.asarray(self.mean + np.concatenate([free - self.gain @ offsets, offsets], axis=1)[..., 0])
 
 
@@ -208,7 +203,6 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
         return np.asarray(summed, dtype=np.float64)
 
     band = np.array([total(at[..., d:], weighted[..., d:] * value[..., : ORDER - d]) for d in range(ORDER)])
-    band[0] *= 1 + JITTER
     sides = total(at, weighted * target[..., None])[:, None]
     of_offsets, tied = np.zeros((many, 0)), np.zeros((many, 0, 0))
     corner = tied
@@ -218,13 +212,17 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
         of_offsets = -weight @ curves.y @ np.eye(count)[curves.member]
         tied = curves.tied * np.exp(-2 * logs[:, -1, None, None])
         corner = tied + np.sum(weight, axis=1)[:, None, None] * np.diag(np.bincount(curves.member))
-    factor = cholesky_banded(band[::-1], check_finite=False)
-    solved = cho_solve_banded((factor, False), sides, check_finite=False)
-    solved, sides = (each.reshape(many, channels * splines, 1 + offsets) for each in (solved, sides))
-    alone, gain, border = solved[..., :1], solved[..., 1:], sides[..., 1:].swapaxes(1, 2)
-    corner = corner - border @ gain
+    try:
+        factor = cholesky_banded(band[::-1], check_finite=False)
+    except LinAlgError:  # of a chain that diverges; a row has 7 entries, each with up to 5 rounding errors of eps / 2
+        band[0] *= 1 + 20 * np.finfo(np.float64).eps
+        factor = cholesky_banded(band[::-1], check_finite=False)
+    half = dtbtrs(factor, sides, trans="T")[0]  # U^-T B; B^T A^-1 B loses fewer digits as the square of this matrix
+    half, solved = (each.reshape(many, channels * splines, 1 + offsets) for each in (half, dtbtrs(factor, half)[0]))
+    alone, gain, border = solved[..., :1], solved[..., 1:], half[..., 1:].swapaxes(1, 2)
+    corner = corner - border @ half[..., 1:]
     covariance = np.asarray(np.linalg.inv(corner), dtype=np.float64)
-    found = covariance @ (of_offsets[..., None] - border @ alone)
+    found = covariance @ (of_offsets[..., None] - border @ half[..., :1])
     mean, found = (alone - gain @ found)[..., 0], found[..., 0]
     log_determinant = 2 * np.sum(np.log(factor[-1]).reshape(many, -1), axis=1) + np.linalg.slogdet(corner)[1]
 
