@@ -7,11 +7,10 @@ halved if the error of the prediction exceeds the tolerance.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +33,7 @@ TESTED = 3
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
-@dataclass(frozen=True)
-class Mean:
+class Mean(NamedTuple):
     """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
     # Shape (1 + groups, cases...): the means over all realisations, then the means without each group of realisations.
@@ -55,9 +53,15 @@ class Mean:
         size = np.zeros(mean.shape) if error is None else _mean(np.abs(error), done & np.isfinite(error))
         return cls(known, np.nan_to_num(size, nan=0.0))
 
-    def at(self, place: tuple[NDArray[np.intp], ...]) -> Mean:
-        """Return the means of some cases, selected by the result of `numpy.ix_`."""
-        return Mean(np.stack([group[place] for group in self.groups]), self.error[place])
+    def lines(self, cases: tuple[NDArray[np.intp], ...], number: int) -> Mean:
+        """Return the means of some cases as a table, in which each row is a line along the axis with index `number`.
+
+        `cases` is the result of `numpy.ix_`.
+        """
+        groups = np.moveaxis(np.stack([group[cases] for group in self.groups]), number + 1, -1)
+        error = np.moveaxis(self.error[cases], number, -1)
+        length = error.shape[-1]
+        return Mean(groups.reshape(len(groups), -1, length), error.reshape(-1, length))
 
 
 def _mean(values: FloatArray, some: BoolArray) -> FloatArray:
@@ -74,18 +78,15 @@ class Mesh:
     series: Series
     # For each adaptive axis (key: its index in the series), the positions of its values, from 0 to 1.
     shares: Mapping[int, FloatArray]
-    # For each adaptive axis, a mask of its needed values for each combination of values of the non-adaptive axes, shape
-    # (lengths of the non-adaptive axes..., values).
-    used: Mapping[int, BoolArray]
+    # Mask of the needed cases. The dimensions are the axes of the series. For each combination of values of the
+    # non-adaptive axes, the needed cases are all combinations of some values of the adaptive axes.
+    cases: BoolArray
 
     @classmethod
     def first(cls, series: Series) -> Mesh:
         """Return the mesh of the first stage: all initial values of all axes are needed."""
-        adaptive = [k for k, axis in enumerate(series.axes) if axis.refinement]
-        others = [len(axis.values) for axis in series.axes if not axis.refinement]
-        sizes = {k: len(series.axes[k].values) for k in adaptive}
-        shares = {k: np.linspace(0.0, 1.0, size) for k, size in sizes.items()}
-        return cls(series, shares, {k: np.ones((*others, size), dtype=bool) for k, size in sizes.items()})
+        shares = {k: np.linspace(0, 1, len(axis.values)) for k, axis in enumerate(series.axes) if axis.refinement}
+        return cls(series, shares, np.ones(tuple(series.sizes.values()), dtype=bool))
 
     def refinement(self, number: int) -> Refinement:
         """Return the refinement of the adaptive axis with index `number`."""
@@ -93,16 +94,15 @@ class Mesh:
         assert found
         return found
 
-    @property
-    def cases(self) -> BoolArray:
-        """Mask of the needed cases. The dimensions of the mask are the axes of the series."""
-        dims = len(self.series.sizes)
-        others = [k for k in range(dims) if k not in self.used]
-        each = (
-            np.moveaxis(used.reshape(*used.shape, *(1,) * (dims - used.ndim)), range(used.ndim), [*others, k])
-            for k, used in self.used.items()
-        )
-        return reduce(np.logical_and, each, np.ones(tuple(self.series.sizes.values()), dtype=bool))
+    def along(self, number: int, cases: BoolArray) -> BoolArray:
+        """Return a view of `cases` with the dimensions (non-adaptive axes..., axis `number`, other adaptive axis)."""
+        others = [k for k in range(cases.ndim) if k not in self.shares]
+        return np.moveaxis(cases, [*others, number], range(len(others) + 1))
+
+    def used(self, number: int) -> BoolArray:
+        """Return a mask of the needed values of an adaptive axis, shape (non-adaptive axes..., values)."""
+        lines = self.along(number, self.cases)
+        return np.asarray(lines.any(axis=-1) if len(self.shares) > 1 else lines)
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Stage:
     @property
     def is_adaptive(self) -> bool:
         """Whether the study may choose more values."""
-        return any(mesh.used for mesh in self.meshes)
+        return any(mesh.shares for mesh in self.meshes)
 
     def after(self, meshes: tuple[Mesh, ...]) -> Stage | None:
         """Return the next stage, which has the given meshes, or None if these meshes contain no new case."""
@@ -161,11 +161,11 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     combinations of non-adaptive values that miss the tolerance although no interval of the combination may be halved.
     """
     found, short = mesh, {}
-    for number in mesh.used:
+    for number in mesh.shares:
         axis = mesh.series.axes[number]
         intervals = list(_intervals(mesh, number, means))
         wide = [interval for interval in intervals if interval.width > FINEST]
-        chosen = _chosen(mesh.used[number], wide, mesh.refinement(number).at_most)
+        chosen = _chosen(mesh.used(number), wide, mesh.refinement(number).at_most)
         found = _halved(found, number, chosen)
         left = {interval.case for interval in intervals} - {interval.case for interval in chosen}
         short[axis.name] = len(left)
@@ -186,23 +186,26 @@ def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_
 
 def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
     """Return the mesh with a new value in the middle of each of the given intervals."""
-    axis, shares, used = mesh.series.axes[number], mesh.shares[number], mesh.used[number]
+    axis, shares = mesh.series.axes[number], mesh.shares[number]
     new = sorted({interval.share for interval in intervals} - set(shares.tolist()))
     shares = np.array([*shares, *new])
-    used = np.concatenate([used, np.zeros((*used.shape[:-1], len(new)), dtype=bool)], axis=-1)
+    cases = np.pad(mesh.cases, [(0, len(new) if k == number else 0) for k in range(mesh.cases.ndim)])
+    lines = mesh.along(number, cases)
     position = {share: k for k, share in enumerate(shares.tolist())}
     for interval in intervals:
-        used[(*interval.case, position[interval.share])] = True
+        line = lines[interval.case]
+        line[position[interval.share]] = line.any(axis=0)
     values = (*axis.values, *mesh.refinement(number).spread.at(np.array(new)))
     axes = tuple(replace(axis, values=values) if k == number else one for k, one in enumerate(mesh.series.axes))
-    return Mesh(replace(mesh.series, axes=axes), {**mesh.shares, number: shares}, {**mesh.used, number: used})
+    return Mesh(replace(mesh.series, axes=axes), {**mesh.shares, number: shares}, cases)
 
 
 def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
     """Yield the untested intervals of an adaptive axis, and those in which interpolation misses a tolerance."""
     refinement = mesh.refinement(number)
-    for case in np.ndindex(mesh.used[number].shape[:-1]):
-        used = {k: np.flatnonzero(mask[case]) for k, mask in mesh.used.items()}
+    masks = {k: mesh.used(k) for k in mesh.shares}
+    for case in np.ndindex(masks[number].shape[:-1]):
+        used = {k: np.flatnonzero(mask[case]) for k, mask in masks.items()}
         order = used[number][np.argsort(mesh.shares[number][used[number]])]
         used[number] = order
         left = iter(case)
@@ -212,8 +215,7 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
         places = refinement.spread.shares(refinement.spread.at(shares)) if refinement.spread.whole else shares
         excess = np.full(shares.size - 1, -np.inf)
         for name, tolerance in refinement.until.items():
-            lines = _lines(means[name].at(cases), number)
-            excess = np.maximum(excess, _excess(places, levels, lines, tolerance))
+            excess = np.maximum(excess, _excess(places, levels, means[name].lines(cases, number), tolerance))
         middles = (shares[:-1] + shares[1:]) / 2
         ends = refinement.spread.at(shares)
         for k, middle in enumerate(middles.tolist()):
@@ -222,14 +224,6 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
             is_untested = max(levels[k], levels[k + 1]) < TESTED and not np.isneginf(excess[k])
             if is_untested or excess[k] > 1.0:
                 yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))
-
-
-def _lines(mean: Mean, number: int) -> Mean:
-    """Return means as a table, in which each row is a line of cases along the axis with index `number`."""
-    groups = np.moveaxis(mean.groups, number + 1, -1)
-    error = np.moveaxis(mean.error, number, -1)
-    rows = math.prod(error.shape[:-1])
-    return Mean(groups.reshape(len(groups), rows, -1), error.reshape(rows, -1))
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:

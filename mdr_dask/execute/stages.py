@@ -55,9 +55,9 @@ def following(
     meshes, short = [], []
     facts: dict[str, int] = {}
     for mesh, template, place in zip(stage.meshes, layout, places, strict=True):
-        more, left = refined(mesh, _means(url, mesh, template, place, realisations)) if mesh.used else (mesh, {})
+        more, left = refined(mesh, _means(url, mesh, template, place, realisations)) if mesh.shares else (mesh, {})
         meshes.append(more)
-        for number in more.used:
+        for number in more.shares:
             axis = more.series.axes[number]
             facts[f"{template.series.name or '-'}.{axis.name}"] = len(axis.values)
             if left[axis.name]:
@@ -68,7 +68,7 @@ def following(
 
 def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
     """Return a sentence that says why interpolation along an adaptive axis misses the tolerance in some cases."""
-    axis, values = mesh.series.axes[number], mesh.used[number].sum(axis=-1)
+    axis, values = mesh.series.axes[number], mesh.used(number).sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
     why = f"at_most is {most} values" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"
     where = f"{series}: " if series else ""
@@ -85,7 +85,7 @@ def _means(
     companions = models.load(template.campaign.model).companions
     done = (store.ledger(url, name, template.shape)[cases] == Status.DONE).transpose(order)
     found = {}
-    for output in sorted({output for number in mesh.used for output in mesh.refinement(number).until}):
+    for output in sorted({output for number in mesh.shares for output in mesh.refinement(number).until}):
         values = store.values(url, name, output)[cases].transpose(order)
         known = output in companions and companions[output].name in template.campaign.outputs
         error = store.values(url, name, companions[output].name)[cases].transpose(order) if known else None
