@@ -6,7 +6,6 @@ printed.
 
 import numpy as np
 
-from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -35,8 +34,8 @@ def main(path: str = "docs/pictures/high-speed.png") -> None:
         friction = kelvin.drag / LOAD
         curves.setdefault("Kelvin solid", []).append(friction)
         ratios.append(friction / kelvin.contact_slope)
-        tips.append(friction[-1] / laws.single_tip(curvature, 4 * LOAD, 1.0, DEBORAH[-1]))
-        curves.setdefault("one parabolic tip", []).append(laws.single_tip(curvature, 4 * LOAD, 1.0, DEBORAH))
+        tips.append(friction[-1] / single_tip(curvature, 4 * LOAD, 1.0, DEBORAH[-1]))
+        curves.setdefault("one parabolic tip", []).append(single_tip(curvature, 4 * LOAD, 1.0, DEBORAH))
         for oversampling in plateaus:
             steps, _ = solve(rough, None, DEBORAH, loads, Request(0.01, oversampling, "backward_euler", False, False))
             curves.setdefault(f"time steps, {oversampling} nodes per Nyquist point", []).append(steps.drag / LOAD)
@@ -58,6 +57,11 @@ def main(path: str = "docs/pictures/high-speed.png") -> None:
         print(f"{oversampling} nodes: rise to the highest node / slope, mean {np.mean(rises) / slope:.4f}")
     print(f"grid of the thesis, 5000 nodes, 200 lines: rise to the highest node / slope, mean {_thesis():.3f}")
     _draw(means, path)
+
+
+def single_tip(curvature, force, viscosity, velocity):
+    """Return mu of one parabolic tip of a viscous foundation, (2/3) sqrt(kappa F_N / (2 eta v))."""
+    return 2 / 3 * np.sqrt(curvature * force / (2 * viscosity * velocity))
 
 
 def _thesis() -> float:

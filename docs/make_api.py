@@ -21,13 +21,15 @@ PUBLIC: dict[str, dict[str, str]] = {
     "Steady sliding": {
         "mdr_dask.physics.sliding.steady": "steady_sliding",
         "mdr_dask.physics.sliding.cases": "Steady",
-        "mdr_dask.physics.sliding.viscoelastic": "steady_viscoelastic_sliding",
         "mdr_dask.physics.surfaces.cubic_line": "periodic_line indented_line",
     },
-    "Solids": {"mdr_dask.physics.solids": "kelvin prony complex_modulus relaxation_modulus fit_series wlf_factor"},
-    "Roughness": {"mdr_dask.physics.surfaces.roughness": "amplitudes phases line spectral_slope"},
+    "Solids": {"mdr_dask.physics.solids": "kelvin prony complex_modulus fit_series wlf_factor"},
+    "Roughness": {
+        "mdr_dask.physics.surfaces.roughness": "amplitudes phases spectral_slope",
+        "mdr_dask.physics.surfaces.waves": "Waves",
+    },
     "Transforms of the method of dimensionality reduction": {
-        "mdr_dask.physics.mdr.transforms": "forward_transform inverse_transform pressure volume",
+        "mdr_dask.physics.mdr.transforms": "forward_transform",
         "mdr_dask.physics.mdr.power_law_contact": "contact_radius depth normal_force stick_radius",
     },
     "Fretting wear": {

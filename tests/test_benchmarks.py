@@ -15,7 +15,7 @@ from benchmarks.solvers import SOLVERS
 from benchmarks.surfaces import validity
 
 #: Random cases of each family; more where a case takes milliseconds.
-CASES = {"wear": 2, "velocity jump": 2, "breakthrough of one revolution": 1, "transforms": 20, "levels of a jump": 20}
+CASES = {"wear": 2, "velocity jump": 2, "breakthrough of one revolution": 1, "levels of a jump": 20}
 
 
 def test_every_command_that_is_named_exists():

@@ -7,14 +7,13 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from schemes import on_line
+from schemes import on_line, viscous_state
 
 from mdr_dask.errors import FitError
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
 from mdr_dask.physics.lubrication.line_contact import LineContact, solve_film
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.solids import prony
 from mdr_dask.physics.superposition.master_curve import superpose
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
@@ -107,19 +106,19 @@ def test_terms_have_no_order_and_equal_ones_are_one(seed, count, force, dashpot)
     moduli, times = prony_terms(seed, count)
     height, _ = line("waves", 64, seed)
     found = [
-        steady_viscoelastic_sliding(periodic_line(height, None), prony(1.0, some, at, dashpot), 10**force)
+        viscous_state(periodic_line(height, None), prony(1.0, some, at, dashpot), 10**force)
         for some, at in (
             (moduli, times),
             (moduli[::-1], times[::-1]),
             (np.append(moduli, 0.5 * moduli[0]) * np.append([0.5], np.ones(count)), np.append(times, times[0])),
         )
     ]
-    assert {one.status for one in found} == {found[0].status}
-    if found[0].status == Outcome.CONVERGED:
-        error = np.maximum(found[0].errors, 1e-7 * np.abs(found[0].values) + 1e-9)
-        for other in found[1:]:
-            assert np.all(np.abs(other.values - found[0].values) <= error)
-        assert found[0].values[0] >= -found[0].errors[0]
+    values, errors, status = found[0]
+    assert {other for _, _, other in found} == {status}
+    if status == Outcome.CONVERGED:
+        for other, _, _ in found[1:]:
+            assert np.all(np.abs(other - values) <= np.maximum(errors, 1e-7 * np.abs(values) + 1e-9))
+        assert values[0] >= -errors[0]
 
 
 @settings(max_examples=12, deadline=None)

@@ -1,7 +1,7 @@
 """Compare our solvers with other programs and with the methods of the papers: a part of docs/comparison.md.
 
 python -m benchmarks peers              all subjects; programs that are not installed are left out
-python -m benchmarks peers contact      one subject: contact, curves, friction, statistics or transforms
+python -m benchmarks peers contact      one subject: contact, curves, friction or statistics
 python -m benchmarks peers page         only write the page, from the stored table
 
 The other programs are dependencies of these benchmarks only: ``pip install '.[peers]'``.
@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.rows import DOCS, Row, dated, number, read, table, with_tables, write
 
 OURS = "mdr_dask"
-SUBJECTS = ("friction", "contact", "curves", "transforms", "statistics")
+SUBJECTS = ("friction", "contact", "curves", "statistics")
 TABLE, PAGE = DOCS / "evidence/peers.csv", DOCS / "comparison.md"
 
 

@@ -13,7 +13,7 @@ from benchmarks.surfaces.punches import areal_surface
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
 from mdr_dask.physics.surfaces.spectrum import self_affine
-from mdr_dask.physics.surfaces.waves import waves_of
+from mdr_dask.physics.surfaces.waves import series, waves_of
 
 POINTS, SIDE, HURST = 2**16, 512, 0.8
 #: Number of points per shortest wavelength.
@@ -24,7 +24,7 @@ def lines(shortest: int) -> tuple[np.ndarray, float]:
     """Return a line of unit length, and its exact rms slope from the amplitudes."""
     modes = POINTS // shortest - (shortest == 2)
     amplitude = roughness.amplitudes(modes, HURST)
-    height = roughness.line(amplitude, roughness.phases(1, 0, modes), POINTS)
+    height = series(0.5 * amplitude * np.exp(1j * roughness.phases(1, 0, modes)), POINTS)
     q = 2 * np.pi * np.arange(1, modes + 1)
     return height, float(np.sqrt(np.sum((amplitude * q) ** 2) / 2))
 

@@ -21,6 +21,7 @@ from mdr_dask.models.per_case import per_case
 from mdr_dask.physics.sliding.steady import steady_sliding
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.waves import Waves
 
 SPEEDS, HALVES = 20, 2
 BLOCKS = SPEEDS * HALVES
@@ -36,9 +37,9 @@ def tally() -> int:
 def friction(speed: int, line: int) -> float:
     """Return the coefficient of friction of one case, with heights in units of the rms roughness."""
     amplitude, phase = roughness.amplitudes(MODES, hurst=0.7), roughness.phases(1, int(line), MODES)
-    height, slope = (roughness.line(amplitude, phase, POINTS, derivative=order) for order in (0, 1))
+    waves = Waves(0.5 * amplitude * np.exp(1j * phase), 2 * MODES)
     deborah = np.array([10.0 ** (-5 + 4 * int(speed) / (SPEEDS - 1))])
-    found = steady_sliding(periodic_line(height, slope), deborah, np.array([LOAD]))
+    found = steady_sliding(periodic_line(waves.heights(POINTS), waves.slopes(POINTS)), deborah, np.array([LOAD]))
     os.write(tally(), b".")
     return float(found.drag[0]) / LOAD
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.waves import series
 
 EVEN, ODD, FEW = (64, 128, 200, 256), (63, 129, 201), (8, 9, 12, 16)
 
@@ -10,7 +11,7 @@ EVEN, ODD, FEW = (64, 128, 200, 256), (63, 129, 201), (8, 9, 12, 16)
 def rough(random, count, hurst=None):
     modes = count // 2
     amplitude = roughness.amplitudes(modes, random.uniform() if hurst is None else hurst)
-    return roughness.line(amplitude, random.uniform(0, 2 * np.pi, modes), count)
+    return series(0.5 * amplitude * np.exp(1j * random.uniform(0, 2 * np.pi, modes)), count)
 
 
 def steps(random, count):
@@ -56,7 +57,8 @@ def noise(random, count):
 
 def smooth(random, count):
     modes = max(count // 8, 1)
-    return roughness.line(roughness.amplitudes(modes, random.uniform()), random.uniform(0, 2 * np.pi, modes), count)
+    amplitude = roughness.amplitudes(modes, random.uniform())
+    return series(0.5 * amplitude * np.exp(1j * random.uniform(0, 2 * np.pi, modes)), count)
 
 
 def backwards(random, count):

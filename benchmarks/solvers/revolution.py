@@ -1,20 +1,16 @@
-"""Benchmarks of bodies of revolution: worn profiles by all rules, and transforms between profile and image."""
+"""Benchmarks of worn profiles by all rules."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from references.literal_wear import literal
-from scipy.special import j0
 
 from benchmarks.solvers.sliding import power
 from benchmarks.solvers.solver import Found, Solver, Truth
-from mdr_dask.physics.mdr import transforms
 from mdr_dask.physics.mdr.revolution import PowerProfile
-from mdr_dask.physics.mdr.uniform_grid import uniform_grid
 from mdr_dask.physics.wear.exact import exact
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.rules import fast
@@ -79,41 +75,6 @@ def wearing(slips: bool, held: bool, random: np.random.Generator) -> tuple[Weari
     return case, Truth(worn.height(case.radii), worn.error("worn_profile", case.radii), case.scale)
 
 
-class Image(NamedTuple):
-    """An image g(x), the positions of its kinks, and the radii at which its profile is computed."""
-
-    image: Callable[[np.ndarray], np.ndarray]
-    breaks: tuple[float, ...]
-    radii: np.ndarray
-
-    def by_sums(self, tolerance: float) -> Found:
-        """Return the profile by Gauss sums."""
-        found = transforms.inverse_transform(self.image, self.radii, breaks=self.breaks, tolerance=tolerance)
-        return Found(found.value, found.error)
-
-    def by_matrix(self, cells: int) -> Found:
-        """Return the profile by the matrix of a uniform grid; the matrix is computed once and reused."""
-        grid, flat = _grid(cells), self.image(np.zeros(1))
-        return Found(np.interp(self.radii, grid.nodes, grid.inverse @ (self.image(grid.nodes) - flat) + flat))
-
-
-_grid = cache(lambda cells: uniform_grid(cells, 2.0))
-
-
-def waves(random: np.random.Generator) -> tuple[Image, Truth]:
-    """Draw the image cos(q x), whose profile is J0(q r)."""
-    wave, radii = power(random, 0, 2), random.uniform(0, 2, 40)
-    return Image(lambda x: np.cos(wave * x), (), radii), Truth(j0(wave * radii), 1e-15)
-
-
-def kink(random: np.random.Generator) -> tuple[Image, Truth]:
-    """Draw the image max(x^2 - b^2, 0) and its profile."""
-    b, radii = random.uniform(0.2, 1.5), random.uniform(0, 2, 40)
-    outside = np.maximum(radii, b)
-    profile = (outside**2 - 2 * b**2) * np.arccos(b / outside) + b * np.sqrt(outside**2 - b**2)
-    return Image(lambda x: np.maximum(x**2 - b**2, 0), (b,), radii), Truth(profile / np.pi, 1e-15)
-
-
 SOLVERS = (
     Solver(
         "wear",
@@ -129,13 +90,5 @@ SOLVERS = (
             "every cycle (thesis)": {f"{cells} cells": partial(Wearing.by_cycles, cells=cells) for cells in (50, 100)},
         },
         rounds=2,
-    ),
-    Solver(
-        "transforms",
-        {"waves": waves, "a kink": kink},
-        {
-            "Gauss sums": {f"tolerance {t:g}": partial(Image.by_sums, tolerance=t) for t in (1e-2, 1e-4, 1e-8)},
-            "matrix of a uniform grid": {f"{n} cells": partial(Image.by_matrix, cells=n) for n in (50, 200, 800)},
-        },
     ),
 )

@@ -14,6 +14,7 @@ from scipy import fft
 
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.spectrum import self_affine
+from mdr_dask.physics.surfaces.waves import series
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from references.areal import areal_surface
@@ -36,7 +37,7 @@ def line(hurst, points, index):
     """Return approach over h, contact length over L, and mean gap over h, of one line at every load."""
     modes = points // RESOLVED
     amplitude = spectrum(hurst, points).line(1.0, modes)
-    height = np.sort(roughness.line(amplitude, roughness.phases(SEED, index, modes), points))[::-1]
+    height = np.sort(series(0.5 * amplitude * np.exp(1j * roughness.phases(SEED, index, modes)), points))[::-1]
     touching = np.arange(1, points + 1)
     carried = (np.cumsum(height) - touching * height) / points  # F / (E* L h) at which each point comes into contact
     count = np.searchsorted(carried, LOADS, side="right")

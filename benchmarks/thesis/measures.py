@@ -11,20 +11,23 @@ from mdr_dask.fits import available
 from mdr_dask.fits.base import law_holds
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.mdr import power_law_contact as contact
-from mdr_dask.physics.mdr.transforms import forward_transform, inverse_transform, power_factor
+from mdr_dask.physics.mdr.half_integrals import graded_panels
+from mdr_dask.physics.mdr.transforms import forward_transform, power_factor
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.waves import Waves
 
 MODES, HURSTS = 2500, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def transforms(_: Studies) -> str:
     """Transform a body with a bend to its line and back."""
-    radius = np.linspace(0.05, 1.0, 20)
+    panels = graded_panels(30, 1, 12)
+    radius, outer = np.sqrt(panels.nodes), panels.nodes > 0.05**2
     image = forward_transform(lambda r: 2 * r + 1.05 * r**2.5, radius).value
     exact = power_factor(2.0) * radius**2 + 0.3 * power_factor(3.5) * radius**3.5
-    back = inverse_transform(lambda x: power_factor(2.0) * x**2 + 0.3 * power_factor(3.5) * x**3.5, radius).value
-    error = max(np.max(np.abs(image / exact - 1)), np.max(np.abs(back / (radius**2 + 0.3 * radius**3.5) - 1)))
+    back = panels.full @ exact
+    error = max(np.max(np.abs(image / exact - 1)), np.max(np.abs(back / (radius**2 + 0.3 * radius**3.5) - 1)[outer]))
     return compared(f"largest relative error {error:.0e}", error)
 
 
@@ -42,8 +45,11 @@ def lines(_: Studies) -> str:
     for hurst in HURSTS:
         amplitude = roughness.amplitudes(MODES, hurst)
         phase = roughness.phases(1, 0, MODES)
-        height, slope = (roughness.line(amplitude, phase, 4 * MODES, derivative) for derivative in (0, 1))
-        departures += [height.std() - 1, slope.std() / roughness.spectral_slope(amplitude) - 1]
+        waves = Waves(0.5 * amplitude * np.exp(1j * phase), 2 * MODES)
+        departures += [
+            waves.heights(4 * MODES).std() - 1,
+            waves.slopes(4 * MODES).std() / roughness.spectral_slope(amplitude) - 1,
+        ]
     return compared("rms height and slope, H = 0 to 1", *departures)
 
 

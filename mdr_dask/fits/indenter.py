@@ -17,7 +17,7 @@ from mdr_dask.fits.base import Fit, require, short
 from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonlinear, one_value, table_of
 from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
-from mdr_dask.physics.surfaces import shapes
+from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 # the law applies if the rms slope of the indenter in contact is at most this fraction of the slope s of the roughness
 BODY = 0.3
@@ -26,20 +26,23 @@ BODY = 0.3
 def _body(data: xr.Dataset) -> tuple[Any, float]:
     """Return c and n of the profile c |x|^n by which the method of dimensionality reduction replaces the indenter."""
     if "indenter_angle" in data.coords:
-        return shapes.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
+        return PowerLaw.of_body(1.0, 1.0).coefficient * np.tan(data["indenter_angle"]), 1.0
     if "indenter_radius" in data.coords:
         return 1 / data["indenter_radius"], 2.0
     if "indenter_coefficient" in data.coords and data["indenter_exponent"].ndim == 0:
         exponent = one_value(data, "indenter_exponent")
-        return shapes.mapped(exponent) * data["indenter_coefficient"], exponent
+        return PowerLaw.of_body(1.0, exponent).coefficient * data["indenter_coefficient"], exponent
     raise FitError("expected a store with an indenter: cone, parabola or power")
 
 
 def _half_width(data: xr.Dataset) -> Any:
-    """Return half the width of the contact of a smooth indenter at rest, in m."""
+    """Return half the width a of the contact of a smooth indenter at rest, in m.
+
+    By thesis 3.3.2, the load F_N / (4 G) is 2 n c a^(n+1) / (n + 1).
+    """
     coefficient, exponent = _body(data)
-    load: Any = data["normal_force"] / (4 * data["shear_modulus"])
-    return shapes.half_width(load, coefficient, exponent)
+    load = data["normal_force"] / (4 * data["shear_modulus"])
+    return ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
 
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:

@@ -45,35 +45,30 @@ def jit_inline_uncounted(function: Kernel) -> Kernel:
 
 
 def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
-    kernel: Any = numba.njit(**options)(function)
-    if hasattr(kernel, "enable_caching"):  # if NUMBA_DISABLE_JIT is set, nothing is compiled
-        try:
-            kernel.enable_caching()
-        except RuntimeError:  # neither the package folder nor the home folder is writable
-            _warn_once("numba finds no folder for compiled kernels")
-        else:
-            _survive_faults(kernel._cache)
+    try:
+        kernel: Any = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # neither the package folder nor the home folder is writable
+        _warn_once("numba finds no folder for compiled kernels")
+        return cast(Kernel, numba.njit(**options)(function))
+    # numba has no public way to survive a full disk or a damaged file of the cache
+    stored = getattr(kernel, "_cache", None)  # None if NUMBA_DISABLE_JIT is set
+    if stored is not None:
+        stored.load_overload = _or_none(stored.load_overload, "read")
+        stored.save_overload = _or_none(stored.save_overload, "written")
     return cast(Kernel, kernel)
 
 
-def _survive_faults(stored: Any) -> None:
-    """Turn errors of numba's cache into warnings. Kernels that cannot be read from the cache are compiled again."""
-    load, save = stored.load_overload, stored.save_overload
+def _or_none(step: Callable[..., Any], done: str) -> Callable[..., Any]:
+    """Return a step of numba's cache that warns and returns None in place of an error."""
 
-    def load_overload(signature: Any, context: Any) -> Any:
+    def tried(*arguments: Any) -> Any:
         try:
-            return load(signature, context)
+            return step(*arguments)
         except Exception as fault:  # reading an incomplete pickle can raise almost any exception
-            _warn_once(f"numba's cache of compiled kernels cannot be read ({type(fault).__name__})")
+            _warn_once(f"numba's cache of compiled kernels cannot be {done} ({type(fault).__name__})")
             return None
 
-    def save_overload(signature: Any, compiled: Any) -> None:
-        try:
-            save(signature, compiled)
-        except Exception as fault:
-            _warn_once(f"numba's cache of compiled kernels cannot be written ({type(fault).__name__})")
-
-    stored.load_overload, stored.save_overload = load_overload, save_overload
+    return tried
 
 
 @cache

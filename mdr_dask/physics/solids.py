@@ -102,17 +102,6 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
     return np.asarray(modulus, dtype=np.complex128)
 
 
-def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return the relaxation modulus G(t) in Pa at the times t > 0 (in s) after a sudden strain.
-
-    The relaxation modulus is the stress divided by the constant strain. The parallel dashpot carries no stress at t >
-    0.
-    """
-    elapsed = np.asarray(time, dtype=np.float64)
-    terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
-    return np.asarray(solid.static_modulus + terms.sum(axis=-1), dtype=np.float64)
-
-
 @dataclass(frozen=True)
 class SeriesFit:
     """A Prony series fitted to moduli, and the errors of the fit.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from jump_blocks import EVERY, STEP, block
 from pydantic import ValidationError
+from schemes import sampled
 
 from mdr_dask.models.base import Status
 from mdr_dask.models.velocity_jump import VelocityJump
@@ -101,7 +102,7 @@ def written_line(tmp_path: Path, nodes: int) -> str:
     amplitude, phase = roughness.amplitudes(50, 0.7), roughness.phases(5, 0, 50)
     x = np.arange(nodes) / nodes * 0.002
     file = tmp_path / "line.csv"
-    rows = np.column_stack([x, 2e-6 * roughness.line(amplitude, phase, nodes)])
+    rows = np.column_stack([x, 2e-6 * sampled(amplitude, phase, nodes)])
     np.savetxt(file, rows, "%.17g", ",", header="x [m],z [m]", comments="")
     return str(file)
 

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from schemes import sampled
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
@@ -28,7 +29,7 @@ BODIES = {"plane": {}, "parabola": {"indenter": {"shape": "parabola", "radius": 
 def measured(path, oversampling=4):
     """Write the first realisation of the generated line to a file."""
     phase = roughness.phases(7, 0, 100)
-    height = 5e-7 * roughness.line(roughness.amplitudes(100, 0.7), phase, 200 * oversampling)
+    height = 5e-7 * sampled(roughness.amplitudes(100, 0.7), phase, 200 * oversampling)
     rows = np.column_stack([np.arange(height.size) * 0.02 / height.size, height])
     np.savetxt(path, rows, "%.17g", ",", header="x,z\nm,m", comments="")
     return {"surface": {"profile": str(path)}}

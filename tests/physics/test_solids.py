@@ -11,7 +11,6 @@ from mdr_dask.physics.solids import (
     kelvin,
     power_law_series,
     prony,
-    relaxation_modulus,
     standard_solid,
     wlf_factor,
 )
@@ -24,12 +23,6 @@ def test_kelvin_and_standard_solid_are_their_closed_forms():
     np.testing.assert_allclose(complex_modulus(kelvin(2e6, 1e-3), omega), 2e6 * (1 + 1j * omega * 1e-3), rtol=ROUNDING)
     wanted = 1e6 + 9e6 * 1j * omega * 0.1 / (1 + 1j * omega * 0.1)
     np.testing.assert_allclose(complex_modulus(standard_solid(1e6, 1e7, 0.1), omega), wanted, rtol=ROUNDING)
-
-
-def test_relaxation_modulus_goes_from_glass_to_static():
-    solid = prony(1.0, [2.0, 3.0], [1e-3, 10.0])
-    np.testing.assert_allclose(relaxation_modulus(solid, [0.0, 1e6]), [6.0, 1.0], rtol=ROUNDING)
-    assert relaxation_modulus(solid, 1.0) == pytest.approx(1 + 3 * np.exp(-0.1), rel=ROUNDING)
 
 
 def test_equal_times_merge_and_empty_terms_vanish():

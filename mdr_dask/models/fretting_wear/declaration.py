@@ -13,7 +13,6 @@ from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts import indenter
-from mdr_dask.models.parts.indenter import RoundedCone
 from mdr_dask.tables import Read, read_table
 
 
@@ -77,11 +76,7 @@ def profile_columns(file: NamedFile) -> Read:
     return table
 
 
-Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]
-#: Bodies whose height is not a power of the radius. Each indentation depth of such a body needs a separate
-#: one-dimensional image.
-Pressed = RoundedCone | Table
-
+Indenter = Annotated[Parabola | Cone | Power | Table, Field(discriminator="shape")]
 #: For each shape, the parameter that states the size of the body in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
 
@@ -225,10 +220,9 @@ class FrettingWear(Parameters):
             )
         if not self.dimensionless:
             self._check_dimensional()
-        if isinstance(self.indenter, Pressed) and self.depth is None:
-            body = "a table of a profile" if isinstance(self.indenter, Table) else f"a {self.indenter.shape}"
+        if isinstance(self.indenter, Table) and self.depth is None:
             raise ValueError(
-                f"{body} needs a dimensional campaign: give depth, instead of normal_force or stick_radius"
+                "a table of a profile needs a dimensional campaign: give depth, instead of normal_force or stick_radius"
             )
         return self
 

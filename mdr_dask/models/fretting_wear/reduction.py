@@ -13,8 +13,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.data_file import NamedFile
-from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Pressed, Table, profile_columns
-from mdr_dask.models.parts.indenter import RoundedCone
+from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table, profile_columns
 
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
@@ -47,7 +46,7 @@ def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     The list has a single element if all cases have the same indenter, or if only parameters of a power law vary, such
     as the angle of a cone.
     """
-    if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
+    if isinstance(block.parameters.indenter, Table) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
     return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
 
@@ -56,7 +55,7 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
     """Return coefficient and exponent of the power-law body of every case. Both numbers are NaN for any other body."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
-        [none if isinstance(one, Pressed) else one.power_law() for one in indenters(block)]
+        [none if isinstance(one, Table) else one.power_law() for one in indenters(block)]
     ).T
     varied = {path.removeprefix("indenter."): np.asarray(column) for path, column in block.columns.items()}
     exponent = varied.get("exponent", exponent)
@@ -70,7 +69,7 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
 
 def has_tables(block: Block[FrettingWear]) -> bool:
     """Return whether the block has an indenter that is not a power law."""
-    return any(isinstance(one, Pressed) for one in indenters(block))
+    return any(isinstance(one, Table) for one in indenters(block))
 
 
 def _scatter(block: Block[FrettingWear]) -> FloatArray:
@@ -169,9 +168,9 @@ def _first_contact(
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
     """Return the contact before wear at an indentation depth. Raise ValueError if the body is a power law."""
-    if not isinstance(indenter, Pressed):
-        raise ValueError("power laws and other profiles cannot be mixed along one axis")
-    return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)
+    if not isinstance(indenter, Table):
+        raise ValueError("power laws and tables of profiles cannot be mixed along one axis")
+    return _pressed_table(indenter.file, depth)
 
 
 @lru_cache(maxsize=64)
@@ -180,13 +179,6 @@ def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
 
     table = profile_columns(file)
     return from_table(table["radius"], table["height"], depth)
-
-
-@lru_cache(maxsize=64)
-def _pressed_body(indenter: RoundedCone, depth: float) -> TableProfile:
-    from mdr_dask.physics.mdr.revolution import from_body
-
-    return from_body(indenter.line(), depth)
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:

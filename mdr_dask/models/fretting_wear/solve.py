@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.fretting_wear.declaration import FAST_AT_DEPTH, MODEL, FrettingWear, Indenter, Pressed
+from mdr_dask.models.fretting_wear.declaration import FAST_AT_DEPTH, MODEL, FrettingWear, Indenter, Table
 from mdr_dask.models.fretting_wear.reduction import (
     Numbers,
     has_tables,
@@ -54,7 +54,7 @@ class Task:
     Several cases can have the same task. `extent` is the last radius of the profiles, divided by a0.
     """
 
-    table: Pressed | None
+    table: Table | None
     depth: float
     exponent: float
     level: float
@@ -305,7 +305,7 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
         )
         for step in parameters.history
     )
-    table = indenter if isinstance(indenter, Pressed) else None
+    table = indenter if isinstance(indenter, Table) else None
     return Task(
         table,
         1.0 if table is None else float(numbers.height[place]),

@@ -12,7 +12,7 @@ from pydantic import Field
 from mdr_dask.models.base import Parameters, quantity
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.surfaces.shapes import Shape
+    from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 
 class Plane(Parameters):
@@ -31,7 +31,7 @@ class _PowerLaw(Parameters):
     def power_law(self) -> tuple[float, float]:
         """Return coefficient c and exponent n of the body c r^n. If the size of the body is not given, c is NaN."""
 
-    def line(self) -> Shape:
+    def line(self) -> PowerLaw:
         """Return the profile, in m, that replaces the body in the method of dimensionality reduction."""
         from mdr_dask.physics.surfaces.shapes import PowerLaw
 
@@ -76,21 +76,4 @@ class Power(_PowerLaw):
         return (math.nan if self.coefficient is None else self.coefficient), self.exponent
 
 
-class RoundedCone(Parameters):
-    """A cone with a rounded tip. The slope is continuous where the tip meets the cone."""
-
-    shape: Literal["rounded_cone"]
-    angle: float = quantity(
-        "rad", "angle between the surface of the cone and the plane that it touches", usual="10 deg", gt=0, lt=np.pi / 2
-    )
-    tip_radius: float = quantity("m", "radius of curvature R of the tip", usual="100 um", gt=0)
-
-    def line(self) -> Shape:
-        """Return the profile, in m, that replaces the body in the method of dimensionality reduction."""
-        from mdr_dask.physics.surfaces.shapes import RoundedCone as Line
-
-        steepness = math.tan(self.angle)
-        return Line(steepness, self.tip_radius * steepness)
-
-
-Indenter = Annotated[Plane | Cone | Parabola | Power | RoundedCone, Field(discriminator="shape")]
+Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]

@@ -20,7 +20,7 @@ from mdr_dask.physics.outcome import Outcome
 
 if TYPE_CHECKING:
     from mdr_dask.physics.sliding.problem import PronyTerms
-    from mdr_dask.physics.surfaces.shapes import Shape
+    from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 STATUS = np.array(
     [
@@ -45,7 +45,7 @@ class Setting:
     """
 
     roughness: Roughness
-    body: Shape | None
+    body: PowerLaw | None
     terms: PronyTerms | None
 
 
@@ -140,7 +140,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
     return SlidingProblems(list(places), which, loads, deborah, length, height, faults)
 
 
-def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
+def _without_units(body: PowerLaw | None, length: float, height: float) -> PowerLaw | None:
     """Return the profile of an indenter with positions divided by `length` and heights divided by `height`.
 
     The numbers are rounded, so that cases that differ only by rounding errors have equal profiles.
@@ -148,8 +148,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
     if body is None:
         return None
     body = body.scaled(float(length), float(height))
-    numbers = {name: float(canonical(number)) for name, number in vars(body).items()}
-    return replace(body, **numbers)  # type: ignore[type-var]  # a protocol of dataclasses
+    return replace(body, coefficient=float(canonical(body.coefficient)), exponent=float(canonical(body.exponent)))
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:

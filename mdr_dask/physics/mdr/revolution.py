@@ -9,13 +9,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator, PPoly
+from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
@@ -200,30 +199,6 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))
     return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0)
-
-
-#: Numbers for `from_body`: the largest radius divided by a0, and half the number of pieces between adjacent `ends`.
-FARTHEST, KNOTS = 8.0, 80
-
-
-def from_body(body: Any, depth: float) -> TableProfile:
-    """Return the profile of a `surfaces.shapes.Shape`, pressed to a depth in the unit of length of the body."""
-
-    def sunk(x: float) -> float:
-        return -float(body.at(np.array([x]))[0][0])
-
-    high = 1.0
-    while sunk(high) < depth:
-        high *= 2.0
-    a0 = bisect(lambda x: sunk(x) - depth, 0.0, high)
-    ends = sorted({0.0, a0, FARTHEST * a0, *(r for r in body.breaks if 0.0 < r < FARTHEST * a0)})
-    # the cubic pieces become shorter towards all `ends`
-    steps = np.sin(0.5 * np.pi * np.arange(2 * KNOTS) / (2 * KNOTS)) ** 2
-    parts = [low + (high - low) * steps**2 for low, high in pairwise(ends)]
-    knots = np.append(np.concatenate(parts), ends[-1])
-    line, slope, _ = body.at(knots)
-    height, image = (CubicHermiteSpline(knots, *values) for values in (body.body(knots), (-line, -slope)))
-    return TableProfile(_scaled(height, a0, depth), _scaled(image, a0, depth), a0)
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:

@@ -66,13 +66,3 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     The argument `xi` is mu / (sqrt 2 slope) with mu from `indenter_low`.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)
-
-
-def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
-    """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
-
-    Only one parabolic tip is in contact. The curvature of this tip at the summit is kappa, in 1/m. The contact extends
-    from the summit to the distance a = sqrt(F_N / (2 eta v kappa)) ahead of the summit. The rms slope in contact is
-    kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
-    """
-    return 2 / 3 * np.sqrt(curvature * force / (2 * viscosity * velocity))

@@ -205,9 +205,11 @@ def steady_sliding(
     --------
     >>> from mdr_dask.physics.surfaces import roughness
     >>> from mdr_dask.physics.surfaces.cubic_line import periodic_line
+    >>> from mdr_dask.physics.surfaces.waves import Waves
     >>> amplitude, phase = roughness.amplitudes(500, hurst=0.7), roughness.phases(seed=1, realisation=0, modes=500)
-    >>> height, slope = (roughness.line(amplitude, phase, 2000, derivative=k) for k in (0, 1))
-    >>> found = steady_sliding(periodic_line(height, slope), np.array([1e-4, 1e-3]), np.array([0.5, 0.5]))
+    >>> waves = Waves(0.5 * amplitude * np.exp(1j * phase), points=1000)
+    >>> line = periodic_line(waves.heights(2000), waves.slopes(2000))
+    >>> found = steady_sliding(line, np.array([1e-4, 1e-3]), np.array([0.5, 0.5]))
     >>> print((found.drag / 0.5).round(3))
     [0.243 2.408]
     """

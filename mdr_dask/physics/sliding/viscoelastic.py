@@ -7,15 +7,14 @@ at the first node. These stretches must be the same after one period. Under an i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.refine import Solution, refine
+from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.viscoelastic_sweep import (
     Passage,
     Travelling,
@@ -24,7 +23,6 @@ from mdr_dask.physics.sliding.viscoelastic_sweep import (
     sweep_line,
 )
 from mdr_dask.physics.solids import LinearSolid, recovery_times
-from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
 LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step
@@ -35,70 +33,6 @@ BALANCE = 1e-3  # largest relative error of the carried load in a converged solu
 ORDER = 2.0  # order of convergence without extrapolation; with extrapolation, higher if many cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
-
-
-@dataclass(frozen=True)
-class ViscoelasticSteady:
-    """A steady state. If the solver did not converge, all values are NaN.
-
-    The entries of `values` are F_x / (4 G_inf), in the unit of height squared; the penetration of the mean line (for an
-    indenter: of the points of height 0); the fraction of the line in contact; and the rms slope of the part of the line
-    in contact. `errors` contains absolute discretisation errors.
-    """
-
-    values: FloatArray
-    errors: FloatArray
-    status: Outcome
-
-
-def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
-    """Return the steady state of a foundation of independent elements that slides along a line.
-
-    The force on an element of width dx is f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'], where u is the
-    displacement of the element and a_m the displacement of the dashpot of Prony term m (thesis 3.3.3, extended to any
-    linear rheology). At the distance s, the element is either in contact, with u = d + h(s), or free, with f = 0. Here
-    d is the depth, and h is the height of the line.
-
-    Parameters
-    ----------
-    line : CubicLine
-        The line. Only the heights at the nodes are used, and neighbouring nodes are connected by straight lines. The
-        number of cells must be a multiple of four, because the case is also solved with only every second and only
-        every fourth node.
-    solid : LinearSolid
-        The material, with the Deborah numbers tau_m v / L as `times` and eta v / L as `viscosity`.
-    load : float
-        F_N / (4 G_inf L), in the unit of height.
-
-    Raises
-    ------
-    ValueError
-        If a height is not finite, the load is not positive and finite, or the number of cells is below 8 or not a
-        multiple of four.
-
-    Notes
-    -----
-    The sweep along a line with straight cells is exact. The result is extrapolated from the solutions with all nodes
-    and with every second node. For the error estimate, another result is extrapolated from the solutions with every
-    second and every fourth node. The error is estimated from the difference of the two extrapolated results.
-    """
-    cells = line.enter.size
-    if not np.all(np.isfinite(line.height)):
-        raise ValueError("the heights must be finite")
-    if cells < 8 or cells % 4:
-        raise ValueError(f"a line needs a multiple of four cells and at least eight, got {cells}")
-    case = ViscoelasticCase(solid, load)
-    top = int(np.argmax(line.height[:cells])) if line.periodic else 0
-    height = np.append(np.roll(line.height[:cells], -top), line.height[top]) if line.periodic else line.height
-
-    def solve(level: int, _: IntArray) -> Solution:
-        return case.on(height[:: cells // level], line.periodic)
-
-    case.on(height[::4], line.periodic)
-    found = refine(solve, 1, (cells // 2, cells), np.inf, ORDER, floors=np.array([0.0, np.std(height), 0.0, 0.0]))
-    values = np.concatenate(found.values)
-    values[DEPTH] += (line.height[:cells].mean() - height[:-1].mean()) if line.periodic else 0.0
-    return ViscoelasticSteady(values, found.errors[:, 0], Outcome(int(found.outcome[0])))
 
 
 class ViscoelasticCase:

@@ -13,7 +13,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
-from mdr_dask.physics.surfaces import shapes
+from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
 # a cubic cell rises above its higher end by at most this factor times the sum of two slopes: the upward slope at its
@@ -55,14 +55,14 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     return CubicLine(height, rise[:-1], rise[1:], True, True)
 
 
-def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Shape) -> CubicLine:
+def indented_line(height: FloatArray, slope: FloatArray | None, body: PowerLaw) -> CubicLine:
     """Return the line of a rough indenter with cubic cells, or with straight cells if no slopes are given.
 
     Parameters
     ----------
     height, slope
         Heights and slopes of the periodic roughness, as in :func:`periodic_line`.
-    body : Shape
+    body : PowerLaw
         The shape under the roughness, with its tip at node n // 2. The unit of length of the shape is the length of the
         line. The unit of height is the unit of the roughness.
     """

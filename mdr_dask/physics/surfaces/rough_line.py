@@ -7,7 +7,7 @@ from functools import cached_property
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, indented_line, periodic_line
-from mdr_dask.physics.surfaces.shapes import Shape
+from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.surfaces.waves import Waves
 
 SEEN = 8  # the highest point of a line is searched on a grid with this many nodes per Nyquist point
@@ -18,7 +18,7 @@ class RoughLine:
     """A rough line on an indenter, or a periodic line on a plane if there is no `body`; the length of the line is 1."""
 
     roughness: Waves
-    body: Shape | None = None
+    body: PowerLaw | None = None
 
     @property
     def points(self) -> int:

@@ -1,4 +1,4 @@
-"""Self-affine rough lines: spectra with a given rms height, phases from a counter-based random stream, lines by FFT."""
+"""Self-affine rough lines: spectra with a given rms height, phases from a counter-based random stream."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, random_stream
-from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
 
@@ -86,33 +85,3 @@ def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False
     return factors
-
-
-def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
-    """Return h(x) = sum A_k cos(2 pi k x + phi_k), or a derivative of h, at x = 0, 1/nodes, ..., by FFT.
-
-    Parameters
-    ----------
-    amplitude, phase : array, shape (modes,)
-        The harmonics k = 1..modes.
-    nodes : int
-        Number of nodes, at least twice the number of modes.
-    derivative : int
-        Order of the derivative with respect to x for a line of unit length; 0 for the heights.
-
-    Raises
-    ------
-    ValueError
-        If the grid does not resolve the shortest wavelength.
-
-    Examples
-    --------
-    >>> amplitude = amplitudes(500, hurst=0.7)
-    >>> height = line(amplitude, phases(seed=1, realisation=0, modes=500), nodes=2000)
-    >>> print(f"{height.std():.3f}")
-    1.000
-    """
-    coefficients = 0.5 * amplitude * np.exp(1j * phase)
-    if derivative:
-        coefficients *= (2j * np.pi * np.arange(1, amplitude.size + 1)) ** derivative
-    return series(coefficients, nodes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,31 +12,6 @@ from mdr_dask.arrays import FloatArray
 
 ITERATIONS = 200
 ROUNDING = 1e-14  # Newton's method ends when its relative step is smaller than this
-
-
-def mapped(exponent: float) -> float:
-    """Return kappa_n of the MDR rule: a body c r^n acts like the line kappa_n c |x|^n (cone: pi/2, parabola: 2)."""
-    return 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
-
-
-class Shape(Protocol):
-    """An indenter: the line that the solvers use, and the body of revolution."""
-
-    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height at every x, and the slopes to the left and to the right of x.
-
-        Heights are positive towards the elastomer, and 0 at the tip.
-        """
-
-    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body of revolution that corresponds to the line."""
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Radii at which the slope or the curvature jumps."""
-
-    def scaled(self, length: float, height: float) -> Shape:
-        """Return the shape in other units of length and height."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +23,9 @@ class PowerLaw:
 
     @classmethod
     def of_body(cls, coefficient: float, exponent: float) -> PowerLaw:
-        """Return the line of a body c r^n."""
-        return cls(mapped(exponent) * coefficient, exponent)
+        """Return the line of a body c r^n; the factor kappa_n of the line is pi/2 for a cone and 2 for a parabola."""
+        kappa = 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
+        return cls(kappa * coefficient, exponent)
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the height -c |x|^n at every x, and the slopes to the left and to the right of x."""
@@ -59,58 +35,9 @@ class PowerLaw:
         right = np.where(x < 0, steepness, -steepness)
         return -self.coefficient * distance**self.exponent, left, right
 
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Return an empty tuple, because the body is smooth except at its tip."""
-        return ()
-
-    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body of revolution that corresponds to the line."""
-        height = self.coefficient / mapped(self.exponent) * r**self.exponent
-        return height, np.where(r > 0.0, self.exponent * height / np.where(r > 0.0, r, 1.0), 0.0)
-
     def scaled(self, length: float, height: float) -> PowerLaw:
         """Return the shape in other units of length and height."""
         return PowerLaw(self.coefficient * length**self.exponent / height, self.exponent)
-
-
-@dataclass(frozen=True)
-class RoundedCone:
-    """The line of a cone with the slope s (`steepness`); the tip is rounded within the radius b (`blend`).
-
-    The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. The line is g = s x^2 / b up to x = b, and
-    g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and Willert, Handbook of Contact
-    Mechanics, 2.5.8).
-    """
-
-    steepness: float
-    blend: float
-
-    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height at every x, and the slopes to the left and to the right of x (both are equal here)."""
-        place, b = np.abs(x), self.blend
-        outer = np.maximum(place, b)
-        root = np.sqrt((outer - b) * (outer + b))
-        angle = np.arctan2(root, b)
-        beyond = outer * (outer - root) / b + outer * angle
-        line = np.where(place <= b, place**2 / b, beyond)
-        slope = np.where(place <= b, 2.0 * place / b, 2.0 * (outer - root) / b + angle)
-        falling = -self.steepness * np.sign(x) * slope
-        return -self.steepness * line, falling, falling
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Return the radius at which the rounded tip ends, where the curvature jumps."""
-        return (self.blend,)
-
-    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body of revolution that corresponds to the line."""
-        height = np.where(r <= self.blend, 0.5 * r**2 / self.blend, r - 0.5 * self.blend)
-        return self.steepness * height, self.steepness * np.minimum(r / self.blend, 1.0)
-
-    def scaled(self, length: float, height: float) -> RoundedCone:
-        """Return the shape in other units of length and height."""
-        return RoundedCone(self.steepness * length / height, self.blend / length)
 
 
 def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.roughness import spectral_slope
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,7 @@ class Waves:
 
     def rms_slope(self) -> float:
         """Return the spectral rms slope, sqrt(sum (A_k q_k)^2 / 2) with A_k = 2 |c_k| and q_k = 2 pi k."""
-        q = 2 * np.pi * np.arange(1, self.coefficients.size + 1)
-        return float(np.sqrt(2 * np.sum((np.abs(self.coefficients) * q) ** 2)))
+        return spectral_slope(2 * np.abs(self.coefficients))
 
 
 def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from schemes import sampled
 from scipy.integrate import quad
 from scipy.stats import norm
 
@@ -40,7 +41,7 @@ def test_pressure_is_that_of_the_springs_of_two_lines() -> None:
     points = 400_000
     amplitude = RMS / np.sqrt(2) * roughness.amplitudes(40_000, 0.7, longest=300.0)
     phase = roughness.phases(7, 0, 80_000).reshape(-1, 2)
-    heights = sum(roughness.line(amplitude, phase[:, roller], points) for roller in (0, 1))
+    heights = sum(sampled(amplitude, phase[:, roller], points) for roller in (0, 1))
     asperities = Asperities(RMS, WAVELENGTH, E_STAR)
     for distance in (-1.0, 0.0, 1.0):
         film = np.mean(np.maximum(distance * RMS - heights, 0))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from schemes import sampled
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import problem
@@ -13,7 +14,7 @@ from mdr_dask.physics.surfaces.waves import waves_of
 
 def _line(modes, seed=1):
     phase = roughness.phases(seed=seed, realisation=0, modes=modes)
-    return RoughLine(waves_of(roughness.line(roughness.amplitudes(modes, hurst=0.7), phase, 2 * modes + 2)))
+    return RoughLine(waves_of(sampled(roughness.amplitudes(modes, hurst=0.7), phase, 2 * modes + 2)))
 
 
 def _rms(line):

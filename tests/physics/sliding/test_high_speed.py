@@ -5,7 +5,6 @@ import pytest
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -28,8 +27,8 @@ def summit_curvature(line):
 
 
 def tip(line, deborah, loads):
-    """Friction of a parabolic tip in units of height over length: force 4 ell, viscosity times velocity De."""
-    return laws.single_tip(summit_curvature(line), 4 * loads, 1.0, deborah)
+    """Friction of a parabolic tip in units of height over length, (2/3) sqrt(kappa F_N / (2 eta v))."""
+    return 2 / 3 * np.sqrt(summit_curvature(line) * 4 * loads / (2 * deborah))
 
 
 @pytest.mark.parametrize("realisation", range(2))
@@ -86,7 +85,7 @@ def test_a_smooth_parabola_has_the_same_limit(terms):
     line, deborah, loads = rough(0, body=PowerLaw(20.0, 2.0)), np.array([1e6]), np.array([1e-2])
     smooth = RoughLine(Waves(np.zeros(0, complex), 64), line.body)
     steady, errors = solve(smooth, terms, deborah, loads, Request(0.005))
-    expected = laws.single_tip(40.0, 4 * loads, 1.0, deborah)
+    expected = 2 / 3 * np.sqrt(40.0 * 4 * loads / (2 * deborah))
     assert np.all(np.abs(steady.drag / loads - expected) <= errors[0] / loads + 0.01 * expected)
 
 

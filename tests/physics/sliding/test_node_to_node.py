@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from schemes import sampled
 
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding.cases import Cases
@@ -22,7 +23,7 @@ DEBORAH = np.geomspace(1e-6, 10, 6)
 
 def line(hurst=0.7, oversampling=2, realisation=0):
     amplitude, phase = roughness.amplitudes(MODES, hurst), roughness.phases(3, realisation, MODES)
-    height, slope = (roughness.line(amplitude, phase, POINTS * oversampling, order) for order in (0, 1))
+    height, slope = (sampled(amplitude, phase, POINTS * oversampling, order) for order in (0, 1))
     return height, slope, roughness.spectral_slope(amplitude)
 
 
@@ -80,8 +81,8 @@ def test_a_case_is_the_same_among_any_others(count):
 def test_a_line_that_does_not_divide_by_the_blocks():
     # 26 modes: 104 nodes, 3 blocks of 32 and 8 more
     amplitude, phase = roughness.amplitudes(26, 0.8), roughness.phases(3, 1, 26)
-    height = roughness.line(amplitude, phase, 104)
-    fine = periodic_line(*(roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)))
+    height = sampled(amplitude, phase, 104)
+    fine = periodic_line(*(sampled(amplitude, phase, 52 * 64, order) for order in (0, 1)))
     deborah, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
     state = settled(8, deborah, loads, height)
     assert state[0] == pytest.approx(sliding.steady_sliding(fine, deborah, loads).drag, rel=0.002)

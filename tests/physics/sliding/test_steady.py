@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from schemes import on_line
+from schemes import on_line, sampled
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import cubic_line as profile
@@ -16,7 +16,7 @@ def rough(modes=100, hurst=0.7, oversampling=4, realisation=0, seed=1):
     amplitude = roughness.amplitudes(modes, hurst)
     phase = roughness.phases(seed, realisation, modes)
     nodes = 2 * modes * oversampling
-    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    height, slope = (sampled(amplitude, phase, nodes, order) for order in (0, 1))
     return height, slope, roughness.spectral_slope(amplitude)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from schemes import sampled
 
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, cut, indented_line, periodic_line, running
@@ -11,7 +12,7 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 def lines(nodes=48):
     amplitude, phase = roughness.amplitudes(12, 0.5), roughness.phases(3, 0, 12)
-    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    height, slope = (sampled(amplitude, phase, nodes, order) for order in (0, 1))
     return {
         "periodic": periodic_line(height, slope),
         "straight": periodic_line(height, None),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from schemes import sampled
 
 from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces import measured, roughness
@@ -12,7 +13,7 @@ LENGTH, POINTS = 1e-3, 512
 
 def self_affine(points=POINTS, waves=100):
     amplitude = 1e-6 * roughness.amplitudes(waves, 0.7)
-    height = roughness.line(amplitude, roughness.phases(1, 0, waves), points)
+    height = sampled(amplitude, roughness.phases(1, 0, waves), points)
     return height, amplitude
 
 

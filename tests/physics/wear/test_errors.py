@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.special import hyp2f1
 
 from mdr_dask.physics.mdr.revolution import PowerProfile
-from mdr_dask.physics.mdr.transforms import pressure
 from mdr_dask.physics.wear.exact import exact
 from mdr_dask.physics.wear.history import LoadBlock, history
 
@@ -57,7 +57,8 @@ def test_little_wear_is_of_the_first_order(exponent, c, accuracy):
         term = lambda t: float(profile.rise(np.array(2 * r * np.sin((angle + t) / 2) * np.sin((angle - t) / 2)), c))  # noqa: E731
         return 2.0 / np.pi * quad(term, 0.0, angle)[0]
 
-    virgin = pressure(profile.image_slope, radii, 1.0).value
+    share = 1.0 - radii**2
+    virgin = exponent / np.pi * np.sqrt(share) * hyp2f1(1, 1 - exponent / 2, 1.5, share)
     first = virgin * np.array([slip(r) for r in radii]) / eta
     cycles = np.sqrt((1.0 - c) * (1.0 + c)) * np.array([1e-6, 1e-5, 1e-4])  # in the time in which the contact changes
     for n, worn in zip(cycles, exact(profile, c, cycles, accuracy, errors=False), strict=True):
