@@ -267,7 +267,6 @@ RESOLVED = 10  # a grid is fine enough only if at least this number of cells is 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
 LAST_STEP = 0.03  # the search ends after a Newton step of at most this fraction of the depth
-SECANT_ERROR = 0.1  # assumed error of the extrapolation over the last step, divided by the extrapolated change
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
@@ -556,16 +555,16 @@ def _search(
     line: Nodes,
     weights: FloatArray,
     cases: Cases,
-    error: float,
+    accuracy: float,
     depths: FloatArray,
     rates: FloatArray,
     results: FloatArray,
 ) -> None:
     """Find the depths of cases on a grid by Newton's method, and extrapolate the results over the last Newton step.
 
-    The search ends if the last Newton step is at most `LAST_STEP` times the depth, the estimated relative error of the
-    extrapolated drag is at most `error`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses of
-    the penetration of the summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the
+    The search ends if the last Newton step is at most `LAST_STEP` times the depth, this step changes the extrapolated
+    drag by at most the fraction `accuracy`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses
+    of the penetration of the summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the
     derivatives of the logarithms of the results with respect to the depth, or NaN if unknown, and is updated.
     `results`, shape (cases, SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth
     is found.
@@ -602,7 +601,7 @@ def _search(
                     if depth + step == depth and not math.isfinite(rate[j]):
                         rate[j] = 0.0
                 closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
-                if size <= LAST_STEP and SECANT_ERROR * abs(rate[DRAG] * step) <= error and closes:
+                if size <= LAST_STEP and abs(rate[DRAG] * step) <= accuracy and closes:
                     depths[case] = depth + step
                     for j in range(SECANTS):
                         rates[case, j] = rate[j]
@@ -618,13 +617,10 @@ def _search(
 
 
 class NodeToNode:
-    """Cases on a rough plane that are solved on finer and finer grids.
+    """Cases on a rough plane that are solved on finer and finer grids to a relative accuracy."""
 
-    `error` is the allowed relative error of the drag due to an inexact depth.
-    """
-
-    def __init__(self, line: RoughLine, cases: Cases, error: float) -> None:
-        self._rough, self._cases, self._error = line, cases, error
+    def __init__(self, line: RoughLine, cases: Cases, accuracy: float) -> None:
+        self._rough, self._cases, self._accuracy = line, cases, accuracy
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
         self._depth = np.full(loads.size, np.nan)  # penetration of the mean line
@@ -643,7 +639,7 @@ class NodeToNode:
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
         depths = np.where(depths > 0, depths, first_depths(some.loads))
-        _search(self._line, weights(level // 2), some, self._error, depths, rates, results)
+        _search(self._line, weights(level // 2), some, self._accuracy, depths, rates, results)
         self._depth[cases], self._rates[cases] = depths - top, rates
         return self._solution(results, depths - top, level)
 
@@ -658,7 +654,7 @@ class NodeToNode:
         for stride in reversed(strides):
             results.fill(np.nan)
             line = nodes(self._rough, highest, stride)
-            _search(line, weights(1), self._cases, self._error, depths, self._rates, results)
+            _search(line, weights(1), self._cases, self._accuracy, depths, self._rates, results)
         self._depth = depths - line.top
         return self._solution(results, self._depth, 1)
 

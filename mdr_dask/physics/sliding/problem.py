@@ -1,6 +1,6 @@
 """Steady sliding of a solid over a line, in dimensionless quantities. A case is a pair of speed and load.
 
-Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If `oversampling` is "auto", a closed
+A Kelvin solid has no friction on a smooth plane. If `oversampling` is "auto", a closed
 form is also used for full contact of any solid with a rough plane. All other cases are solved by one of three modules:
 
 * `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane;
@@ -24,7 +24,6 @@ from mdr_dask.physics.sliding import node_to_node, steady
 from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
 from mdr_dask.physics.sliding.full_contact import steady_full_contact
 from mdr_dask.physics.surfaces.rough_line import RoughLine
-from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
 """Floors of `Steady.columns`. If a result is below the floor, the relative error is the error divided by the floor.
@@ -38,8 +37,6 @@ CELL_LEVELS = tuple(2**k for k in range(1, 7))
 GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
 ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contact patches are shorter than a cell
 ORDER_OF_STEPS = 1.0  # order of convergence of backward Euler
-SEARCH = 0.1  # allowed error of the drag due to an inexact depth, divided by the accuracy
-REFERENCE = 0.01  # accuracy of the reference solution from which the errors of backward Euler are estimated
 ROUNDING = 1e-12  # relative error of closed forms
 
 
@@ -89,9 +86,8 @@ def solve(
     cases = Cases(deborah, loads)
     if terms is not None:
         return _general(line, terms, cases, request)
-    is_smooth = not np.any(line.roughness.coefficients)
-    if is_smooth and (line.body is None or isinstance(line.body, PowerLaw)):
-        return _closed_form(line.body, cases)
+    if line.body is None and not np.any(line.roughness.coefficients):
+        return _smooth_plane(cases)
     grid = request.oversampling
     if grid == "auto":
         return _to_accuracy(line, cases, request)
@@ -102,7 +98,7 @@ def solve(
     errors = np.full((4, loads.size), np.inf)
     if request.with_errors:
         # backward Euler converges too slowly for an error estimate from two grids
-        exact, errors = solve(line, None, *cases, Request(REFERENCE, contact=request.contact))
+        exact, errors = solve(line, None, *cases, Request(request.accuracy, contact=request.contact))
         errors = np.abs(found.columns - exact.columns) + errors
         errors[np.isnan(errors)] = np.inf
     return found, errors
@@ -114,7 +110,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
     columns, errors, status = _in_full_contact(line, PronyTerms(), cases) if on_plane else _unsolved(cases)
     left = np.flatnonzero(valid(*cases) & (status != Outcome.CONVERGED))
     if on_plane and left.size and request.accuracy > node_to_node.ARITHMETIC:
-        search = node_to_node.NodeToNode(line, cases.only(left), SEARCH * request.accuracy)
+        search = node_to_node.NodeToNode(line, cases.only(left), request.accuracy)
         found = refine(
             search.solve,
             left.size,
@@ -213,17 +209,8 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
     return Steady.of(columns, status), errors
 
 
-def _closed_form(body: PowerLaw | None, cases: Cases) -> tuple[Steady, FloatArray]:
-    """Return the steady states on a smooth plane, where friction is zero, or on a smooth indenter."""
-    (deborah, loads), good = cases, valid(*cases)
-    status = np.where(good, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
-    columns = np.full((4, loads.size), np.nan)
-    if body is None:
-        columns[:, good] = np.array([np.zeros(loads.size), loads, np.ones(loads.size), np.zeros(loads.size)])[:, good]
-    elif np.any(good):
-        depth, drag, lead, trail, stretch = smooth(loads[good], deborah[good], body.coefficient, body.exponent)
-        columns[:, good] = np.stack([drag, depth, lead + trail, np.sqrt(stretch / (lead + trail))])
-        outcome = np.where(np.isnan(depth), Outcome.DEPTH_NOT_FOUND, Outcome.CONVERGED)
-        status[good] = np.where(np.maximum(lead, trail) > 0.5, Outcome.OUTSIDE_LINE, outcome)
-    found = Steady.of(columns, status)
-    return found, ROUNDING * np.abs(found.columns)
+def _smooth_plane(cases: Cases) -> tuple[Steady, FloatArray]:
+    """Return the steady states on a smooth plane, where friction is zero."""
+    zero = np.zeros(cases.loads.size)
+    status = np.where(valid(*cases), np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
+    return Steady.of(np.array([zero, cases.loads, zero + 1, zero]), status), np.zeros((4, zero.size))

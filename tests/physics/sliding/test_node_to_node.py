@@ -32,10 +32,10 @@ def cases():
     return deborah.ravel(), loads.ravel()
 
 
-def settled(refinement, deborah, loads, height, error=1e-9):
+def settled(refinement, deborah, loads, height, accuracy=1e-8):
     """Return drag, depth, contact fraction and slope on a grid of 2 * refinement nodes per Nyquist point."""
     plane = RoughLine(replace(waves_of(height), points=height.size // 2))
-    search, every = NodeToNode(plane, Cases(deborah, loads), error), np.arange(loads.size)
+    search, every = NodeToNode(plane, Cases(deborah, loads), accuracy), np.arange(loads.size)
     for level in 2 ** np.arange(int(np.log2(refinement)) + 2):
         found = search.solve(int(level), every)
     return np.array(found.values)
@@ -71,7 +71,7 @@ def test_a_case_is_the_same_among_any_others(count):
     deborah, loads = cases()
 
     def solve(some):
-        return settled(4, deborah[some], loads[some], height, 5e-3)
+        return settled(4, deborah[some], loads[some], height, 5e-2)
 
     everything = solve(np.arange(loads.size))
     some = np.random.default_rng(count).permutation(loads.size)[:count]

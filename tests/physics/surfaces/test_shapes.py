@@ -1,50 +1,25 @@
-"""Smooth power-law indenters: closed form of friction, compared with quadrature and sweeps."""
+"""Smooth power-law indenters: sweeps and the solver compared with the closed form of friction."""
 
 import numpy as np
 import pytest
+from references.smooth_indenter import smooth
 from schemes import under_indenter
 from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.surfaces import shapes as indenter
+from mdr_dask.physics.sliding.problem import Request, solve
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.surfaces.waves import Waves
 
-DEPTH, DRAG, LEADING, TRAILING = range(4)
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
-
-
-def solve(load, deborah, coefficient, exponent):
-    load, deborah = np.atleast_1d(load).astype(float), np.atleast_1d(deborah).astype(float)
-    return np.array(indenter.smooth(load, deborah, coefficient, exponent))
 
 
 @pytest.mark.parametrize("exponent", [1, 1.5, 2, 3])
 def test_mapping_keeps_the_load_of_the_body(exponent):
     # the MDR rule itself: g(x) = |x| integral_0^|x| f'(r) / sqrt(x^2 - r^2) dr with f = r^n and r = x sin t
     abel, _ = quad(lambda t: exponent * np.sin(t) ** (exponent - 1), 0, np.pi / 2)
-    assert indenter.PowerLaw.of_body(1.0, exponent).coefficient == pytest.approx(abel, rel=1e-10)
-
-
-@pytest.mark.parametrize(("coefficient", "exponent"), SHAPES)
-@pytest.mark.parametrize("deborah", [1e-4, 1e-1])
-def test_closed_form_agrees_with_quadrature(coefficient, exponent, deborah):
-    load = 0.02
-    depth, drag, a, b, stretch = solve(load, deborah, coefficient, exponent)[:, 0]
-
-    def slope(x):
-        return -np.sign(x) * coefficient * exponent * abs(x) ** (exponent - 1)
-
-    def force(x):
-        return depth - coefficient * abs(x) ** exponent + deborah * slope(x)
-
-    parts = [(-a, 0.0), (0.0, b)]
-    integrals = [
-        sum(quad(f, *part, epsabs=0, epsrel=1e-11)[0] for part in parts if part[1] > part[0])
-        for f in (force, lambda x: force(x) * slope(x), lambda x: slope(x) ** 2)
-    ]
-    assert integrals == pytest.approx([load, drag, stretch], rel=1e-9)
-    if b > 0 and force(2 * a) < 0:
-        assert b == pytest.approx(brentq(force, 1e-300, 2 * a, xtol=1e-300, rtol=1e-14), rel=1e-9)
+    assert PowerLaw.of_body(1.0, exponent).coefficient == pytest.approx(abel, rel=1e-10)
 
 
 @pytest.mark.parametrize(("coefficient", "exponent"), [shape for shape in SHAPES if shape[1] != 1.5])
@@ -53,17 +28,28 @@ def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
     deborah = np.geomspace(1e-10, 1e2, 13)
     load = np.full(13, 0.02)
     steady = under_indenter(np.zeros(nodes), np.zeros(nodes), coefficient, exponent, deborah, load)
-    exact = solve(load, deborah, coefficient, exponent)
+    exact = smooth(load, deborah, coefficient, exponent)
     assert np.all(steady.status == Outcome.CONVERGED)
     # cubic cells hold a cone and a parabola exactly; a quartic to the fourth order
-    assert steady.drag == pytest.approx(exact[DRAG], rel=1e-6)
-    assert steady.depth == pytest.approx(exact[DEPTH], rel=1e-6)
-    assert steady.contact_fraction == pytest.approx(exact[LEADING] + exact[TRAILING], rel=1e-3)
+    assert steady.drag == pytest.approx(exact[0], rel=1e-6)
+    assert steady.depth == pytest.approx(exact[1], rel=1e-6)
+    assert steady.contact_fraction == pytest.approx(exact[2], rel=1e-3)
+
+
+@pytest.mark.parametrize(("coefficient", "exponent"), SHAPES)
+@pytest.mark.parametrize("accuracy", [0.01, 1e-4])
+def test_stated_errors_of_a_smooth_indenter_hold(coefficient, exponent, accuracy):
+    load, deborah = (grid.ravel() for grid in np.meshgrid([1e-4, 0.02], np.geomspace(1e-6, 10, 8)))
+    line = RoughLine(Waves(np.zeros(0, complex), 1000), PowerLaw(coefficient, exponent))
+    steady, errors = solve(line, None, deborah, load, Request(accuracy))
+    exact = smooth(load, deborah, coefficient, exponent)
+    assert np.all(np.abs(steady.columns - exact) <= errors + 1e-9 * exact)
+    assert np.all(errors[0] <= accuracy * exact[0])
 
 
 def test_time_steps_tend_to_the_closed_form():
     load, deborah = np.full(3, 0.02), np.array([1e-2, 0.1, 1.0])
-    exact = solve(load, deborah, 0.5, 2.0)[DRAG]
+    exact = smooth(load, deborah, 0.5, 2.0)[0]
     errors = [
         np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, deborah, load, "backward_euler").drag / exact - 1))
         for n in (2000, 8000)
@@ -77,13 +63,3 @@ def test_a_contact_that_leaves_the_line_fails(scheme):
     zeros, load = np.zeros(200), np.array([0.005, 0.2, 2.0])
     steady = under_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
     assert steady.status.tolist() == [Outcome.CONVERGED, Outcome.OUTSIDE_LINE, Outcome.OUTSIDE_LINE]
-
-
-def test_low_velocity_gives_the_law():
-    # thesis eq. 3.34 without roughness: mu = 4 v tau 2a <g'^2> G / F_N
-    depth, drag, a, b, stretch = solve(0.02, 1e-9, 0.3, 1.0)[:, 0]
-    assert a == pytest.approx(indenter.half_width(np.array(0.02), 0.3, 1.0), rel=1e-6)
-    assert b == pytest.approx(a, rel=1e-6)
-    assert drag == pytest.approx(1e-9 * 2 * a * 0.3**2, rel=1e-6)
-    assert depth == pytest.approx(0.3 * a, rel=1e-6)
-    assert stretch == pytest.approx(2 * a * 0.3**2, rel=1e-6)
