@@ -159,7 +159,6 @@ def fit_series(
     storage: ArrayLike,
     loss: ArrayLike,
     terms_per_decade: float = 1.0,
-    dashpot: bool = False,
 ) -> SeriesFit:
     """Fit a Prony series to a table of measured moduli by non-negative least squares of the relative errors.
 
@@ -172,8 +171,6 @@ def fit_series(
     terms_per_decade : float
         Number of relaxation times per decade. The relaxation times extend from half a decade below the smallest 1 /
         omega to half a decade above the largest 1 / omega.
-    dashpot : bool
-        Whether a parallel dashpot is fitted as well.
 
     Raises
     ------
@@ -189,13 +186,17 @@ def fit_series(
         )
     if not all(np.all(np.isfinite(a) & (a > 0)) for a in (omega, stored, lost)):
         raise ValueError("frequencies and moduli must be positive and finite")
-    times = _times_covering(omega, terms_per_decade)
-    design = _relative_design(omega, stored, lost, times, dashpot)
-    weights, _ = nnls(design, np.ones(2 * omega.size), maxiter=100 * design.shape[1])
-    static, moduli = weights[0], weights[1 : 1 + times.size]
+    slowest, fastest = 10**0.5 / omega.min(), 10**-0.5 / omega.max()
+    terms = max(2, round(np.log10(slowest / fastest) * terms_per_decade) + 1)
+    times = np.geomspace(fastest, slowest, terms)
+    product = np.multiply.outer(omega, times)
+    of_storage = np.column_stack([np.ones_like(omega), product / (product + 1 / product)])
+    of_loss = np.column_stack([np.zeros_like(omega), _loss_columns(omega, times)])
+    design = np.vstack([of_storage / stored[:, None], of_loss / lost[:, None]])
+    (static, *moduli), _ = nnls(design, np.ones(2 * omega.size), maxiter=100 * (terms + 1))
     if static <= 0:
         raise ValueError("the fitted static modulus is zero: the table must reach the rubbery plateau")
-    solid = prony(static, moduli, times, weights[-1] if dashpot else 0.0)
+    solid = prony(static, moduli, times)
     modulus = complex_modulus(solid, omega)
     errors = modulus.real / stored - 1, modulus.imag / lost - 1
     larger = np.maximum(*np.abs(errors))
@@ -204,27 +205,9 @@ def fit_series(
     return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), float(larger[worst]), float(omega[worst]), covered)
 
 
-def _times_covering(omega: FloatArray, terms_per_decade: float) -> FloatArray:
-    slowest, fastest = 10**0.5 / omega.min(), 10**-0.5 / omega.max()
-    terms = max(2, round(np.log10(slowest / fastest) * terms_per_decade) + 1)
-    return np.geomspace(fastest, slowest, terms)
-
-
 def _loss_columns(omega: FloatArray, times: FloatArray) -> FloatArray:
     product = np.multiply.outer(omega, times)
     return np.asarray(1 / (product + 1 / product), dtype=np.float64)
-
-
-def _relative_design(
-    omega: FloatArray, storage: FloatArray, loss: FloatArray, times: FloatArray, dashpot: bool
-) -> FloatArray:
-    product = np.multiply.outer(omega, times)
-    stored = np.column_stack([np.ones_like(omega), product / (product + 1 / product)])
-    lost = np.column_stack([np.zeros_like(omega), _loss_columns(omega, times)])
-    if dashpot:
-        stored = np.column_stack([stored, np.zeros_like(omega)])
-        lost = np.column_stack([lost, omega])
-    return np.vstack([stored / storage[:, None], lost / loss[:, None]])
 
 
 def _rms(values: FloatArray) -> float:

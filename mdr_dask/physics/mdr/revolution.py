@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -31,32 +31,6 @@ class Image(NamedTuple):
     exponent: float
     knots: FloatArray
     coefficients: FloatArray
-
-
-class Profile(Protocol):
-    """A body whose profile f and image g increase with the radius."""
-
-    @property
-    def largest_radius(self) -> float:
-        """Largest radius of the profile."""
-
-    def height(self, radius: FloatArray) -> FloatArray:
-        """Return f0(r)."""
-
-    def image(self, position: FloatArray) -> FloatArray:
-        """Return g0(x), x >= 0."""
-
-    def image_slope(self, position: FloatArray) -> FloatArray:
-        """Return g0'(x), x >= 0."""
-
-    def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start) without cancellation."""
-
-    def inside(self, level: float) -> float:
-        """Return the position where g0 reaches a level between 0 and 1."""
-
-    def pieces(self) -> Image:
-        """Return the image for compiled code."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +115,9 @@ class TableProfile:
     def pieces(self) -> Image:
         """Return the image for compiled code."""
         return Image(np.nan, np.ascontiguousarray(self.image_curve.x), np.ascontiguousarray(self.image_curve.c))
+
+
+Profile = PowerProfile | TableProfile
 
 
 _ABSCISSA, _WEIGHT = gauss(8)
