@@ -10,9 +10,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, anisotropic, levelled_map, line_of_scan
-from mdr_dask.physics.surfaces.measured import rms_slope
 from mdr_dask.physics.surfaces.scans import Cut, averaged, cut_of_lines, hann_window
 from mdr_dask.physics.surfaces.self_affine import SelfAffine, fit_self_affine, steep_limit
+from mdr_dask.physics.surfaces.waves import waves_of
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -108,8 +108,8 @@ def _of_map(
 def _of_scan(scans: ScanFiles, file: DataFile, row: dict[str, float | str]) -> dict[str, tuple[FloatArray, FloatArray]]:
     line = line_of_scan(scans, file)
     cut = cut_of_lines([line], scans.window == "hann")
-    row |= {"Pq": float(line.height.std())}
-    row |= {"slope_x": rms_slope(line.height * hann_window(line.height.size), line.length), "length": line.length}
+    slope = waves_of(line.height * hann_window(line.height.size)).rms_slope() / line.length
+    row |= {"Pq": float(line.height.std()), "slope_x": slope, "length": line.length}
     return {"x": (cut.wavenumber, cut.density)}
 
 

@@ -1,4 +1,4 @@
-"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid, and rms slope."""
+"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.surfaces.waves import waves_of
 
 Detrend = Literal["none", "mean", "line", "parabola"]
 
@@ -97,8 +96,3 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
     if longest > 0:
         waves[(number > 0) & (number < length / longest * (1 - 1e-12))] = 0
     return np.asarray(np.fft.irfft(waves, height.size), dtype=np.float64)
-
-
-def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the rms slope of a periodic line, from all waves that are at least two spacings of the points long."""
-    return waves_of(height).rms_slope() / length

@@ -63,7 +63,7 @@ def test_statistics_are_those_of_the_spectrum():
     height, amplitude = self_affine()
     q = 2 * np.pi * np.arange(1, amplitude.size + 1) / LENGTH
     assert np.std(height) == pytest.approx(np.sqrt(np.sum(amplitude**2) / 2), rel=1e-12)
-    assert measured.rms_slope(height, LENGTH) == pytest.approx(np.sqrt(np.sum((amplitude * q) ** 2) / 2), rel=1e-12)
+    assert waves_of(height).rms_slope() / LENGTH == pytest.approx(np.sqrt(np.sum((amplitude * q) ** 2) / 2), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -88,4 +88,4 @@ def test_rms_slope_is_that_of_the_line_that_solvers_slide_over(kind, points):
         kind
     ]
     expected = np.sqrt(np.mean((waves_of(height).slopes(8 * points) / LENGTH) ** 2))
-    assert measured.rms_slope(height, LENGTH) == pytest.approx(expected, rel=1e-12)
+    assert waves_of(height).rms_slope() / LENGTH == pytest.approx(expected, rel=1e-12)
