@@ -131,11 +131,13 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
     """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
+    # contact fraction and slope belong to a lattice depth, which may be the same on two grids
+    unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:
         found = _on_grid(line, cases.only(some), request, level, depths[some])
         depths[some] = found.depth
-        return Solution(found.columns, found.status)
+        return Solution(found.columns, found.status, unseen)
 
     # sweeps over cubic cells have the order ORDER_OF_CELLS only with at least two nodes per Nyquist point
     order = ORDER_OF_CELLS if request.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS

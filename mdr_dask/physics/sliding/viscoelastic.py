@@ -119,6 +119,13 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
     return Travelling(moduli, deborah, times, stretch.T.copy(), moduli[:, None] / distance / norm)
 
 
+def static_depth(profile: FloatArray, strain_area: float) -> float:
+    """Return the depth at which the positive entries of depth + profile have the sum `strain_area`."""
+    falling = np.sort(profile)[::-1]
+    depths = (strain_area - np.cumsum(falling)) / np.arange(1, profile.size + 1)  # if 1, 2, ... entries are positive
+    return float(depths[np.flatnonzero(depths + falling > 0)[-1]])
+
+
 class Swept(NamedTuple):
     """A solid, and the pieces of a sweep, which are alternately free recoveries and contacts.
 
@@ -222,29 +229,6 @@ def _dot(one: FloatArray, other: FloatArray) -> float:
     for k in range(one.size):
         total += one[k] * other[k]
     return total
-
-
-@jit
-def static_depth(profile: FloatArray, strain_area: float) -> float:
-    """Return the depth at which the positive entries of depth + profile have the sum `strain_area`."""
-    depth = 0.0
-    for value in profile:
-        depth -= value
-    depth = (depth + strain_area) / profile.size
-    for _ in range(200):
-        total, touching = 0.0, 0
-        for value in profile:
-            if depth + value > 0:
-                total += depth + value
-                touching += 1
-        if touching == 0:
-            depth = strain_area
-            continue
-        step = (total - strain_area) / touching
-        depth -= step
-        if abs(step) <= 1e-12 * depth:
-            break
-    return depth
 
 
 @jit

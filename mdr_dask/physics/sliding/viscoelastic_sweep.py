@@ -98,6 +98,17 @@ def separation_point(
 
 
 @jit
+def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:
+    """Return the strain of a free element after a distance, and the derivative of the strain along the distance."""
+    strain, rate = 0.0, 0.0
+    for k in range(times.size):
+        term = modes[k] * np.exp(-distance / times[k])
+        strain += term
+        rate -= term / times[k]
+    return strain, rate
+
+
+@jit
 def contact_point(low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray) -> float:
     """Return the place t where a free element meets the straight line start + slope (t - low), with low <= t <= high.
 
@@ -105,11 +116,8 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
     """
     point = low
     for _ in range(60):
-        gap, rate = -(start + slope * (point - low)), -slope
-        for k in range(times.size):
-            term = modes[k] * np.exp(-point / times[k])
-            gap += term
-            rate -= term / times[k]
+        strain, rate = _strain_of(point, modes, times)
+        gap, rate = strain - (start + slope * (point - low)), rate - slope
         if gap <= 0 or rate >= 0:
             return point
         step = -gap / rate
@@ -119,17 +127,6 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
         if step <= 1e-15 * high:
             return point
     return point
-
-
-@jit
-def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:
-    """Return the strain of a free element after a distance, and the derivative of the strain along the distance."""
-    strain, rate = 0.0, 0.0
-    for k in range(times.size):
-        term = modes[k] * np.exp(-distance / times[k])
-        strain += term
-        rate -= term / times[k]
-    return strain, rate
 
 
 @jit
