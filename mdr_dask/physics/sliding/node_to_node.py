@@ -220,7 +220,6 @@ RESOLVED = 10  # a grid is fine enough only if at least this number of cells is 
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # the search ends after a Newton step of at most this fraction of the depth
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
@@ -513,8 +512,8 @@ def _search(
 ) -> None:
     """Find the depths of cases on a grid by Newton's method, and extrapolate the results over the last Newton step.
 
-    The search ends if the last Newton step is at most `LAST_STEP` times the depth, this step changes the extrapolated
-    drag by at most the fraction `accuracy`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses
+    The search ends if the last Newton step changes the depth and the extrapolated drag by at most the fraction
+    `accuracy`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses
     of the penetration of the summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the
     derivatives of the logarithms of the results with respect to the depth, or NaN if unknown, and is updated.
     `results`, shape (cases, SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth
@@ -552,7 +551,7 @@ def _search(
                     if depth + step == depth and not math.isfinite(rate[j]):
                         rate[j] = 0.0
                 closes = abs(workspace[U, k] - workspace[BEGAN, k]) <= CLOSED * workspace[U, k]
-                if size <= LAST_STEP and abs(rate[DRAG] * step) <= accuracy and closes:
+                if size <= accuracy and abs(rate[DRAG] * step) <= accuracy and closes:
                     depths[case] = depth + step
                     for j in range(SECANTS):
                         rates[case, j] = rate[j]
