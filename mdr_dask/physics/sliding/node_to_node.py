@@ -513,11 +513,10 @@ def _search(
     """Find the depths of cases on a grid by Newton's method, and extrapolate the results over the last Newton step.
 
     The search ends if the last Newton step changes the depth and the extrapolated drag by at most the fraction
-    `accuracy`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses
-    of the penetration of the summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the
-    derivatives of the logarithms of the results with respect to the depth, or NaN if unknown, and is updated.
-    `results`, shape (cases, SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth
-    is found.
+    `accuracy`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses of the penetration of the
+    summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the derivatives of the
+    logarithms of the results with respect to the depth, or NaN if unknown, and is updated. `results`, shape (cases,
+    SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth is found.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
