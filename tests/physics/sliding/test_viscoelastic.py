@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from references.slow_friction import Body, reference, waves
+from references.smooth_indenter import smooth
 from schemes import material_on_line, on_line, sampled, viscous_state
-from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.viscoelastic import DEPTH, DRAG, FRACTION, ViscoelasticCase
@@ -85,27 +85,14 @@ def test_friction_falls_with_velocity_without_a_floor():
     )
 
 
-def parabola(velocity, radius, modulus, time, force):
-    """Closed form: contact from -sqrt(d R) to the zero of w + v tau w' (physics of the smooth Kelvin parabola)."""
-    deborah = velocity * time
-
-    def forces(depth):
-        lead, trail = -np.sqrt(depth * radius), -deborah + np.sqrt(deborah**2 + depth * radius)
-        stress = np.polynomial.Polynomial([depth, -2 * deborah / radius, -1 / radius])
-        both = [stress.integ(), (stress * np.polynomial.Polynomial([0, -2 / radius])).integ()]
-        return [4 * modulus * (p(trail) - p(lead)) for p in both]
-
-    depth = brentq(lambda d: forces(d)[0] - force, 1e-12, 1e-1, xtol=1e-18, rtol=1e-14)
-    return forces(depth)[1] / force, depth
-
-
 @pytest.mark.parametrize("velocity", [1e-3, 0.1, 1.0, 10.0])
 def test_smooth_parabola_is_its_closed_form(velocity):
     x = np.linspace(-0.008, 0.008, 4001)
     state = material_on_line(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), velocity, 1.0, periodic=False)
-    friction, depth = parabola(velocity, 0.01, 1e6, 1e-3, 1.0)
+    load = np.array([1.0 / 4e6])
+    drag, depth, _, _ = smooth(load, np.array([velocity * 1e-3]), 100.0, 2.0)[:, 0]
     assert state.status == Outcome.CONVERGED
-    assert state.friction_coefficient == pytest.approx(friction, rel=state.error + 1e-5)
+    assert state.friction_coefficient == pytest.approx(drag / load[0], rel=state.error + 1e-5)
     assert state.depth == pytest.approx(depth, rel=3e-4)
     assert state.error < 0.02
 
