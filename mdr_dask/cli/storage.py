@@ -76,18 +76,17 @@ def _document(found: Inspection) -> dict[str, object]:
 def report(stores: tuple[str, ...], output: Path) -> None:
     """Write a page about studies: one HTML file that any browser opens, without a network.
 
-    The page contains the campaign, the progress and all figures with their numbers. The page gives fitted laws with
-    intervals, the errors of the results, and the method with its limits. The page also states how to run the study
-    again. The page can also be written during a run.
+    The page contains the campaign, the progress, the warnings, all figures with their numbers, the fitted laws with
+    intervals, the errors of the results, and the papers to cite. The page can also be written during a run.
 
     \b
     mdr-dask report results/quickstart.zarr -o report.html
     mdr-dask report results/dry.zarr results/oil.zarr -o both.html
     """
-    from mdr_dask.report import page, read_study
+    from mdr_dask.report.page import page
 
     require_suffix(output, (".html", ".htm"))
-    text = page([read_study(store) for store in stores])
+    text = page(stores)
     with writing(output):
         output.write_text(text, encoding="utf-8")
     click.echo(str(output))

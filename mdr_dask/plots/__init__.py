@@ -1,7 +1,6 @@
 """Figures drawn from a store.
 
-A figure is first described as data (module `figure`), and then drawn with matplotlib (module `render`) or in a browser
-(`mdr_dask.report`).
+A figure is first described as data (module `figure`), and then drawn with matplotlib (module `render`).
 """
 
 from __future__ import annotations

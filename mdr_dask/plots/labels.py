@@ -127,7 +127,7 @@ def meaning(values: xr.DataArray, name: str) -> str:
     removed.
     """
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
-    for ascii_form, symbol in _MATHTEXT.items():
+    for ascii_form, symbol in _MATHTEXT.items() if "$" not in words else ():
         words = re.sub(ascii_form, symbol, words)
     return words
 

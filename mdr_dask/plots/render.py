@@ -43,13 +43,16 @@ class Drawn(MplFigure):
         """Return a table of all points that are drawn; see `mdr_dask.plots.figure.Figure.table`."""
         return self.description.table()
 
+    def csv(self, float_format: str | None = None) -> str:
+        """Return the table as CSV, below comment lines that describe the figure."""
+        head = "".join(f"# {line}\n" for line in self.description.head(self.origin))
+        return head + self.table().to_csv(index=False, lineterminator="\n", float_format=float_format)
+
     def save(self, path: str | Path) -> None:
         """Write the figure to a file, and the table of the figure to the same folder: ``mu.pdf`` and ``mu.csv``."""
         beside = table_beside(path)
         self.savefig(path, dpi=150 if page.current().width is None else 300)
-        with beside.open("w", encoding="utf-8", newline="") as stream:
-            stream.writelines(f"# {line}\n" for line in self.description.head(self.origin))
-            self.table().to_csv(stream, index=False, lineterminator="\n")
+        beside.write_text(self.csv(), encoding="utf-8", newline="")
 
 
 def table_beside(path: str | Path) -> Path:

@@ -17,11 +17,7 @@ from typing import Any
 from mdr_dask import store
 from mdr_dask.errors import StoreError
 from mdr_dask.report.page import page
-from mdr_dask.report.study import Study, read_study
 from mdr_dask.store import CHECKSUMS, PUBLISHED
-
-#: Endings of files that are compressed in the zip. Chunks are compressed already and stay as they are.
-TEXTS = (".json", ".jsonl", ".html", ".txt", ".yaml", ".csv", ".sha256")
 
 
 def publish(url: str, target: Path) -> int:
@@ -36,39 +32,34 @@ def publish(url: str, target: Path) -> int:
             f"{url}: number of faulty files: {len(found.findings)} (the first, {first.name}, is {first.kind}); repair "
             f"the store with 'mdr-dask verify --repair {url}' before you publish it"
         )
-    study = read_study(url)
-    campaign, data = _campaign(url, study)
+    held = store.attributes(url)
+    campaign, data = _campaign(url, str(held["campaign"]))
     beside = {
-        f"{PUBLISHED}{study.source or 'campaign.yaml'}": campaign,
+        f"{PUBLISHED}{held.get('source') or 'campaign.yaml'}": campaign,
         **{f"{PUBLISHED}{name}": content for name, content in data.items()},
-        f"{PUBLISHED}report.html": page([study]).encode(),
+        f"{PUBLISHED}report.html": page([url]).encode(),
         f"{PUBLISHED}environment.txt": _environment().encode(),
     }
     digests: dict[str, str] = {}
     leftover = target.with_name(f"{target.name}.partial")
     try:
-        with zipfile.ZipFile(leftover, "w") as packed:
+        with zipfile.ZipFile(leftover, "w", zipfile.ZIP_DEFLATED) as packed:
             for name, content in chain(store.contents(url), beside.items()):
-                _put(packed, name, content)
+                packed.writestr(name, content)
                 digests[name] = hashlib.sha256(content).hexdigest()
             lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
-            _put(packed, CHECKSUMS, lines.encode())
+            packed.writestr(CHECKSUMS, lines)
         leftover.replace(target)
     finally:
         leftover.unlink(missing_ok=True)
     return len(digests) + 1
 
 
-def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
-    how = zipfile.ZIP_DEFLATED if name.endswith(TEXTS) else zipfile.ZIP_STORED
-    packed.writestr(name, content, compress_type=how)
-
-
-def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
+def _campaign(url: str, text: str) -> tuple[bytes, dict[str, bytes]]:
     """Return the campaign and the files that the campaign names. The returned name of a file outside the folder of the
     campaign has no folder. The returned campaign contains this name.
     """
-    text, found = study.campaign, {}
+    found = {}
     for file in _named_files(url):
         name = PurePosixPath(str(file["name"]).replace("\\", "/"))
         if name.is_absolute() or ".." in name.parts or ":" in name.parts[0]:
