@@ -12,8 +12,8 @@ from scipy.special import ndtri
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, distinguishable
-from mdr_dask.physics.superposition.posterior import STEP_SCATTER, Curves, solve
-from mdr_dask.physics.superposition.sampling import draws
+from mdr_dask.physics.superposition.posterior import BEND, ROUNDING, STEP_SCATTER, Curves, solve
+from mdr_dask.physics.superposition.sampling import CHAINS, draws
 
 EXPANSION = 6e-4
 """Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
@@ -163,7 +163,7 @@ def superpose(
         y=np.concatenate([y + k for (_, y), k in zip(arrays, rise, strict=True)], axis=1),
         member=np.repeat(np.arange(values.size), [x.size for x, _ in arrays]),
         count=values.size,
-        height=np.maximum(np.median([np.ptp(y, axis=1) for _, y in arrays], axis=0), 1e-3),
+        height=np.maximum(np.median([np.ptp(y, axis=1) for _, y in arrays], axis=0), ROUNDING / BEND),
         splines=4,
         offset={"none": None, "free": FREE}.get(vertical, OFFSET),
         drifting=vertical == "free",
@@ -217,7 +217,7 @@ def _merged(
     mean = shifts.mean(axis=0)
     x = problem.x + mean[problem.member]
     grid = np.linspace(x.min(), x.max(), 201)
-    parts = np.array_split(rows, max(len(rows) // 50, 1))
+    parts = np.array_split(rows, len(rows) // CHAINS)
     unknowns = np.concatenate([solve(problem, part).unknowns(generator) for part in parts])
     offsets = unknowns[:, -count:] if problem.offset else np.zeros((len(rows), count))
     lifted = np.stack([problem.spline(c, unknowns, shifts, grid) for c in range(channels)], axis=1)
@@ -268,7 +268,7 @@ def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArra
     order = np.argsort(low, axis=1)
     reach = np.maximum.accumulate(np.take_along_axis(high, order, 1), axis=1)
     apart = np.zeros(shifts.shape, dtype=bool)
-    gap = np.take_along_axis(low, order, 1)[:, 1:] > reach[:, :-1] + 1e-9 * np.ptp(x)
+    gap = np.take_along_axis(low, order, 1)[:, 1:] > reach[:, :-1]
     np.put_along_axis(apart, order[:, 1:], gap, 1)
     return apart
 

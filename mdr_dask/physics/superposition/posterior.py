@@ -122,7 +122,9 @@ class Curves:
         means = [np.zeros(self.count - 1), np.repeat(np.log(BEND * self.height), self.count)]
         means.append(np.log([median for median, _ in scales]))
         widths = np.diag([width**-2.0 for _, width in scales])
-        return np.concatenate(means), block_diag(step_precision(self.count), *[bends] * channels, widths)
+        steps = np.eye(self.count - 1) - np.eye(self.count - 1, k=-1)
+        shifts = steps.T @ np.linalg.inv(step_covariance(self.count)) @ steps
+        return np.concatenate(means), block_diag(shifts, *[bends] * channels, widths)
 
 
 # coefficients of the four cubic B-splines that overlap on a cell; one row for each power of the position in the cell
@@ -294,8 +296,6 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
     return first, powers @ _VALUES + (place - first - inside)[..., None] * slope, slope
 
 
-def step_precision(count: int) -> FloatArray:
-    """Return the prior precision of the shifts of all curves except the first. Shifts are in widths of a curve."""
-    steps = np.eye(count - 1) - np.eye(count - 1, k=-1)
-    covariance = STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2
-    return np.asarray(steps.T @ np.linalg.inv(covariance) @ steps, dtype=np.float64)
+def step_covariance(count: int) -> FloatArray:
+    """Return the prior covariance of the steps between neighbouring curves, in widths of a curve squared."""
+    return np.asarray(STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2, dtype=np.float64)

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.special import softmax
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.superposition.posterior import CELLS, MARGIN, Curves, Solved, solve, step_precision
+from mdr_dask.physics.superposition.posterior import CELLS, MARGIN, Curves, Solved, solve, step_covariance
 
 HOPS = 2
 """Number of jumps after each move; a jump changes the step between two neighbouring curves."""
@@ -55,9 +55,7 @@ def first_guess(curves: Curves) -> FloatArray:
         mean = float(share @ rows[:, 0])
         means.append(mean + begin[0] - begin[1])
         variances.append(float(share @ (rows[:, 0] - mean) ** 2) + (steps[1] - steps[0]) ** 2)
-    known = np.linalg.inv(step_precision(curves.count))
-    steps_of = np.eye(curves.count - 1) - np.eye(curves.count - 1, k=-1)
-    prior = steps_of @ known @ steps_of.T
+    prior = step_covariance(curves.count)
     return np.cumsum(prior @ np.linalg.solve(prior + np.diag(variances), means))
 
 
@@ -145,9 +143,7 @@ def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> t
     maxima; with jumps, a chain passes from one maximum to another.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
-    known = step_precision(curves.count)
-    sums = np.tril(np.ones((lines, lines)))
-    known = sums.T @ known @ sums
+    known = np.linalg.inv(step_covariance(curves.count))
     steps = np.diff(place[:, :lines], axis=1, prepend=0.0)
     which = generator.integers(lines, size=rows.size)
     old, width = steps[rows, which], known[which, which] ** -0.5
