@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -43,24 +43,6 @@ class DataError(MdrDaskError):
 
 class FitError(MdrDaskError):
     """A law that cannot be fitted to the data."""
-
-
-#: Number of digits that distinguish any two double-precision numbers.
-_ALL_DIGITS = 17
-
-
-def distinguishable(
-    value: float,
-    *limits: float,
-    digits: int = 3,
-    write: Callable[[float, int], str] = lambda number, digits: f"{number:.{digits}g}",
-) -> tuple[str, ...]:
-    """Return a number and its limits as texts, with more than `digits` digits if the number would look like a limit."""
-    for more in range(digits, _ALL_DIGITS):
-        first, *others = (write(number, more) for number in (value, *limits))
-        if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):
-            return first, *others
-    return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
 #: For each common name of a quantity: the parameters and outputs that a user may mean by this name.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series, measured
-from mdr_dask.errors import CampaignError, ModelError, distinguishable
+from mdr_dask.errors import CampaignError, ModelError
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
@@ -273,10 +273,9 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
     limit = available_memory()
     if needed <= limit:
         return []
-    wanted, most = distinguishable(needed / 2**30, limit / 2**30)
     return [
-        f"{template.campaign.source}: one case needs about {wanted} GiB of memory, "
-        f"expected at most the {most} GiB of this machine (fewer points, or less oversampling)"
+        f"{template.campaign.source}: one case needs about {needed / 2**30:.4g} GiB of memory, "
+        f"expected at most the {limit / 2**30:.4g} GiB of this machine (fewer points, or less oversampling)"
     ]
 
 

@@ -11,7 +11,7 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from mdr_dask.errors import distinguishable, similar
+from mdr_dask.errors import similar
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -210,11 +210,6 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     power = 3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12)
     power = power if power in PREFIXES else 0
     return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {PREFIXES[power]}{unit}"
-
-
-def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a quantity and its limits as texts, with enough digits to distinguish the quantity from each limit."""
-    return distinguishable(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
 
 
 def seconds(duration: float) -> str:

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from mdr_dask import models
 from mdr_dask.campaign.fields import usual, walk
 from mdr_dask.campaign.reference import output_rows, parameter_rows
-from mdr_dask.errors import did_you_mean, distinguishable
+from mdr_dask.errors import did_you_mean
 from mdr_dask.models.base import unit_of
-from mdr_dask.units import expected, is_doubtful, likely, shown, shown_apart, to_si
+from mdr_dask.units import expected, is_doubtful, likely, shown, to_si
 
 
 @pytest.mark.parametrize(
@@ -163,17 +163,6 @@ def test_a_number_without_a_unit_is_doubtful_where_another_unit_is_likelier(valu
 )
 def test_hints_name_related_quantities(word, known, hint):
     assert did_you_mean(word, known) == f" (did you mean {hint})"
-
-
-def test_a_number_and_its_limits_have_the_fewest_digits_that_distinguish_them():
-    assert distinguishable(1.2345, 1.0) == ("1.23", "1")
-    assert distinguishable(1.0001, 1.0) == ("1.0001", "1")
-    assert distinguishable(1.0001, 1.0, 1.0002, digits=2) == ("1.0001", "1", "1.0002")
-    assert distinguishable(2.0, 2.0) == ("2", "2")
-    least = math.nextafter(0.1, 1)
-    assert len(set(distinguishable(least, 0.1))) == 2
-    assert shown_apart("m", 1e-3 * (1 + 1e-9), 1e-3) == ("1.000000001 mm", "1 mm")
-    assert shown_apart("K", 293.15, 293.1501) == ("20 degC", "20.0001 degC")
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.models.numbers import least_of, numbers_of
+from mdr_dask.models.numbers import numbers_of
 from mdr_dask.tables import AGREE, Line, Read, Sheet, listed, matched, read_sheet, read_table
 from mdr_dask.units import shown
 
@@ -60,21 +60,18 @@ def read_measured(
     outputs: Mapping[str, str],
     axes: Mapping[str, ArrayLike] | None = None,
     wanted: Collection[str] = (),
-    least: Mapping[str, float] | None = None,
 ) -> Measured:
     """Read a table of measured points. `conditions` and `outputs` map names of possible columns to SI units.
 
     If the table contains several outputs, the output in `wanted` is read. A heading such as ``temperature`` may be
     short for ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An axis without a
     column is an unknown parameter. DataError is raised if all numbers of an unused column lie in the range of an
-    unknown parameter, because the column may be misnamed. `least` contains lower bounds of conditions.
+    unknown parameter, because the column may be misnamed.
     """
     sheet = read_sheet(text, source)
     units = {**outputs, **conditions}
     short = _short_names(units)
-    columns = [
-        Column(name, unit, short[name], needed=False, least=(least or {}).get(name)) for name, unit in units.items()
-    ]
+    columns = [Column(name, unit, short[name], needed=False) for name, unit in units.items()]
     present = {column.name for column, _, _ in matched(sheet, columns) if column} if sheet.names else set()
     found = [name for name in outputs if name in present]
     found = [name for name in found if name in wanted] or found
@@ -195,8 +192,7 @@ def require_readable(table: DataFile, model: str, outputs: Sequence[str], series
     """Raise DataError if a table is too large, or does not fit any series of a campaign."""
     size = len(table.read_text())
     if size > LARGEST:
-        got, most = distinguishable(size / 1e6, LARGEST / 1e6)
-        raise DataError(f"{table.name}: expected a table of at most {most} MB, got {got} MB")
+        raise DataError(f"{table.name}: expected a table of at most {LARGEST} characters, got {size}")
     found = [each for _, each in _readings(table, model, outputs, series)]
     if isinstance(found[0], DataError) and not any(isinstance(each, Measured) for each in found):
         raise found[0]
@@ -210,7 +206,7 @@ def _readings(
         assert table is not None
         try:
             columns = _of_series(model, outputs, one)
-            yield one, read_measured(table.read_text(), table.name, *columns, least=least_of(model))
+            yield one, read_measured(table.read_text(), table.name, *columns)
         except DataError as error:
             yield one, error
 

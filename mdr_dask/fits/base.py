@@ -15,7 +15,7 @@ import xarray as xr
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.errors import FitError, distinguishable
+from mdr_dask.errors import FitError
 
 #: A law holds if the relative deviations of the data from the law are small: rms at most this value, and the largest
 #: deviation at most twice this value.
@@ -197,13 +197,12 @@ def law_holds(
     rms, largest = 100 * np.sqrt(np.mean(departures**2)), 100 * np.max(np.abs(departures))
     size = max(rms, largest / 2)
     limit = 100 * (WITHIN if max(size, 100 * scatter) <= 100 * WITHIN else APPROXIMATE)
-    pairs = distinguishable(rms, limit, digits=2), distinguishable(largest, 2 * limit, digits=2)
-    (mean, of_mean), (most, of_most) = ((_plain(one), _plain(other)) for one, other in pairs)
+    mean, most = _percentage(rms, limit), _percentage(largest, 2 * limit)
     if departures.size == 1:
-        departs, limits = f"departs by {_signed(float(departures.flat[0]), mean)} %", f"limit {of_mean} %"
+        departs, limits = f"departs by {_signed(float(departures.flat[0]), mean)} %", f"limit {limit:g} %"
     else:
         departs = f"departs by {mean} % rms, at most {most} %{f' at {where}' if where else ''}"
-        limits = f"limits {of_mean} % and {of_most} %"
+        limits = f"limits {limit:g} % and {2 * limit:g} %"
     if np.isnan(scatter) or (chance is not None and np.isnan(chance) and size > limit):
         return f"not tested: too few realisations for the scatter; {departs}"
     if np.isinf(scatter):
@@ -227,6 +226,12 @@ def _probability(chance: float | None) -> str:
 
 def _signed(number: float, digits: str) -> str:
     return digits if digits == "0" else f"{'-' if number < 0 else '+'}{digits}"
+
+
+def _percentage(number: float, limit: float) -> str:
+    """Return a percentage with two digits, or with four if the percentage would look like the limit."""
+    text = f"{number:.2g}"
+    return _plain(text if text != f"{limit:.2g}" else f"{number:.4g}")
 
 
 def _plain(number: str) -> str:

@@ -40,7 +40,6 @@ from mdr_dask.fits.posterior import (
     written,
 )
 from mdr_dask.fits.prediction import Prediction, prediction
-from mdr_dask.models.numbers import least_of
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
@@ -232,8 +231,7 @@ def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
     axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim}
-    least = least_of(str(dataset.attrs.get("model")))
-    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted, least=least)
+    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:

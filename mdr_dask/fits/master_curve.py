@@ -11,7 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.collapse import constants_of, kelvins, laws_of, sign_of, with_verdict
 from mdr_dask.fits.curve_tables import (
@@ -112,8 +112,7 @@ def _inside(groups: FloatArray, reference: float) -> float:
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
-        got, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
-        raise DataError(f"expected a reference between {low} and {high}, got {got}")
+        raise DataError(f"expected a reference between {groups.min():.9g} and {groups.max():.9g}, got {reference:.9g}")
     return float(np.clip(reference, groups.min(), groups.max()))
 
 

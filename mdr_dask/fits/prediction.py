@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured, belonging
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
-from mdr_dask.units import shown_apart
+from mdr_dask.units import shown
 
 #: Relative difference up to which a measured and a computed value of a parameter count as equal. If the study has too
 #: few values for an interpolation, `AGREE` is used.
@@ -118,7 +118,8 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
             off = ((wanted < low) | (wanted > high)) & np.isnan(belonging(wanted, ends))
         if off.any():
             worst = int(np.flatnonzero(off)[0])
-            measured_at, *known = shown_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
+            unit = str(held.attrs.get("units", "1"))
+            measured_at, *known = (shown(float(value), unit, 9) for value in (wanted[worst], *ends))
             place = f"{measured.source}:{measured.lines[worst].number}"
             hint = "" if held.ndim else " only (delete the column to use this value)"
             raise DataError(f"{place}: {name} is {measured_at}, but this study has {' to '.join(known)}{hint}")

@@ -15,7 +15,7 @@ from scipy.stats import t
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import FitError, distinguishable
+from mdr_dask.errors import FitError
 
 #: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
@@ -154,8 +154,7 @@ def _advice(result: xr.Dataset) -> str:
     if widest <= NARROW:
         return f"enough points: every interval is narrower than +-{NARROW:g}"
     more = int(np.ceil(cases * ((widest / NARROW) ** 2 - 1)))
-    width, narrow = distinguishable(widest, NARROW, digits=2)
     return (
-        f"not enough points: the widest interval is +-{width}; about {float(f'{more:.2g}'):g} cases more would "
-        f"make all of them +-{narrow}"
+        f"not enough points: the widest interval is +-{widest:.3g}; about {float(f'{more:.2g}'):g} cases more would "
+        f"make all of them +-{NARROW:g}"
     )

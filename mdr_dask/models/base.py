@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 
 
 class Status(IntEnum):
@@ -118,8 +117,7 @@ def _conceivable(least: float, value: Any) -> Any:
     """Raise ValueError for a number so large or so small that products of such numbers overflow or underflow."""
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
-            got, low, high = distinguishable(number, least, MOST, digits=6)
-            raise ValueError(f"expected an absolute value between {low} and {high} in SI units, got {got}")
+            raise ValueError(f"expected an absolute value between {least:g} and {MOST:g} in SI units, got {number:.9g}")
     return value
 
 
@@ -327,7 +325,6 @@ class Model(Generic[P]):
     * `whole`: parameters whose axes are not divided among blocks, because the cases along such an axis share work. If a
     block becomes too large, the axis of the last parameter in `whole` is divided first.
     * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
-    * `least`: smallest possible values of coordinates, such as 0 for a radius.
     * `distinct`: number of solutions of a block, for ``check``. Equal cases share one solution. If `distinct` is None,
     every case counts as one solution.
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
@@ -346,7 +343,6 @@ class Model(Generic[P]):
     operations: Callable[[Block[P]], float] | None = None
     whole: tuple[str, ...] = ()
     coordinates: Callable[[P], dict[str, Coordinate]] = lambda _: {}
-    least: Mapping[str, float] = field(default_factory=dict)
     distinct: Callable[[Block[P]], int] | None = None
     memory: Callable[[Block[P]], float] = lambda _: 0.0
     units: Callable[[P], dict[str, str]] = lambda _: {}

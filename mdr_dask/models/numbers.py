@@ -7,8 +7,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from mdr_dask import models
-from mdr_dask.errors import ModelError
 from mdr_dask.models.base import Parameters, unit_of
 from mdr_dask.models.data_file import DataFile
 
@@ -28,17 +26,6 @@ def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float
         elif isinstance(value, int | float) and not isinstance(value, bool) and name not in idle:
             found[prefix + name] = (value, unit_of(type(parameters), name) or "1", field.description or "")
     return found
-
-
-def least_of(name: str) -> dict[str, float]:
-    """Return the lower bounds of the parameters and coordinates of a model, or {} if the model cannot be loaded."""
-    try:
-        model = models.load(name)
-    except ModelError:
-        return {}
-    fields = model.parameters.model_fields.items()
-    bounds = [(key, getattr(each, "ge", getattr(each, "gt", None))) for key, field in fields for each in field.metadata]
-    return {key: bound for key, bound in bounds if bound is not None} | dict(model.least)
 
 
 def entries_of(axis: Mapping[str, Any]) -> dict[tuple[str, ...], list[Any]]:

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.physics.jit import jit
 
 GAS_CONSTANT = 8.31446261815324
@@ -235,8 +234,8 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
     """
     difference = np.asarray(temperature, dtype=np.float64) - reference
     if np.any(c2 + difference <= 0):
-        lowest, end = distinguishable(float(np.min(temperature)), reference - c2, digits=6)
-        raise ValueError(f"the law of Williams, Landel and Ferry is valid above {end} K only, got {lowest} K")
+        got = f"{np.min(temperature):.9g} K"
+        raise ValueError(f"the law of Williams, Landel and Ferry is valid above {reference - c2:.9g} K only, got {got}")
     return np.asarray(10 ** (-c1 * difference / (c2 + difference)), dtype=np.float64)
 
 

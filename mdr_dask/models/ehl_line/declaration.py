@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.physics.lubrication.film_formulas import STEEL
 
@@ -127,8 +126,9 @@ class EhlLineParameters(Parameters):
         if self.viscosity_law == "roelands" and self.viscosity is None:
             raise ValueError("viscosity_law: roelands needs the parameter viscosity")
         if self.profile_end <= self.profile_start:
-            end, start = distinguishable(self.profile_end, self.profile_start, digits=6)
-            raise ValueError(f"expected profile_end above profile_start {start}, got {end}")
+            raise ValueError(
+                f"expected profile_end above profile_start {self.profile_start!r}, got {self.profile_end!r}"
+            )
         return self
 
 

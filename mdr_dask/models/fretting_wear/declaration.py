@@ -352,7 +352,6 @@ MODEL = Model(
         *("indenter.radius", "indenter.angle", "indenter.coefficient"),
     ),
     coordinates=coordinates,
-    least={"radius": 0.0},
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
     notes=deferred("mdr_dask.models.fretting_wear.reduction", "notes"),

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table, profile_columns
@@ -189,10 +188,10 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
     if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
         return
     for case, realisation in np.argwhere(~(numbers.level > 0.0)):
-        times, _ = distinguishable(1.0 - numbers.level[case, realisation], 1.0, digits=4)
+        times = 1.0 - numbers.level[case, realisation]
         messages.setdefault(
             (int(case), int(realisation)),
-            f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times} times that; "
+            f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times:.9g} times that; "
             "lower amplitude, raise friction, depth or normal_force, or give path (sliding in one direction) "
             "or history (blocks of load) instead of cycles",
         )

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.mixed_lubrication.lines import (
     MOST_POINTS,
@@ -22,7 +22,7 @@ from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import STEEL, HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil
-from mdr_dask.units import shown_apart
+from mdr_dask.units import shown
 
 Positive = Annotated[float, Field(gt=0)]
 #: Circumference of a roller divided by the shortest wavelength, for `shortest_wavelength: auto` with `points: auto`.
@@ -234,8 +234,7 @@ class MixedLubrication(Parameters):
         length = source.length(self.perimeter)
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
         if width > length:
-            got, most = distinguishable(width, length, digits=4)
-            return f"expected a contact width 2a of at most the length of the line, {most} m, got {got} m"
+            return f"expected a contact width 2a of at most the length of the line, {length:.9g} m, got {width:.9g} m"
         return ""
 
     def oil_data(self) -> Oil:
@@ -255,7 +254,7 @@ def notes(sets: Sequence[MixedLubrication]) -> tuple[str, ...]:
     width = max(2 * float(one.dry_contact(one.normal_force).half_width) for one in sets)
     if longest <= width * (1 + 1e-9):
         return lines
-    wave, widest = shown_apart("m", longest, width)
+    wave, widest = shown(longest, "m", 9), shown(width, "m", 9)
     return (
         *lines,
         f"the longest wavelength, {wave}, exceeds the largest contact width 2a, {widest}: the load on the asperities "

@@ -9,7 +9,6 @@ from functools import lru_cache
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
 from mdr_dask.units import shown
@@ -47,11 +46,11 @@ class _Random(ABC):
     def problem(self, perimeter: float) -> str:
         """Return the reason why the lines cannot be made, or an empty string."""
         if self.longest > self.modes:
-            longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
-            return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
+            longest, shortest = perimeter / self.longest, perimeter / max(self.modes, 1)
+            return f"expected the longest wavelength above the shortest, got {longest:.9g} m and {shortest:.9g} m"
         if 2 * self.modes > self.points[-1]:
-            wave, least = distinguishable(perimeter / self.modes, 2 * perimeter / self.points[-1], digits=4)
-            return f"expected a shortest wavelength of at least two point spacings, {least} m, got {wave} m"
+            wave, least = perimeter / self.modes, 2 * perimeter / self.points[-1]
+            return f"expected a shortest wavelength of at least two point spacings, {least:.9g} m, got {wave:.9g} m"
         return ""
 
     @abstractmethod

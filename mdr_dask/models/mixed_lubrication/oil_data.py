@@ -15,7 +15,7 @@ from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants
 from mdr_dask.tables import read_sheet, read_table
-from mdr_dask.units import converts, shown, shown_apart
+from mdr_dask.units import converts, shown
 
 _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
 
@@ -114,8 +114,9 @@ class OilData(Parameters):
         ends = ((self.lowest_temperature, min(one, two), "below"), (self.highest_temperature, max(one, two), "above"))
         for wanted, end, side in ends:
             if wanted is not None and (wanted < end if side == "below" else wanted > end):
-                reached, known = shown_apart("K", wanted, end)
-                notes.append(f"oil: the viscosity is extrapolated {side} {known}, to {reached}")
+                notes.append(
+                    f"oil: the viscosity is extrapolated {side} {shown(end, 'K', 9)}, to {shown(wanted, 'K', 9)}"
+                )
         return tuple(notes)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 
 
 def missed_accuracy(
@@ -31,10 +30,7 @@ def missed_accuracy(
     messages = {}
     for k in np.flatnonzero(np.any([~(share <= accuracy) for share in shares.values()], axis=0)) if shares else ():
         late = {name: share[k] for name, share in shares.items() if not share[k] <= accuracy}
-        texts = (
-            f"{name} {distinguishable(share, accuracy, digits=2)[0] if np.isfinite(share) else 'unknown'}"
-            for name, share in late.items()
-        )
+        texts = (f"{name} {f'{share:.3g}' if np.isfinite(share) else 'unknown'}" for name, share in late.items())
         messages[int(k)] = (
             f"an accuracy of {accuracy:.12g} is missed{where}; estimated relative errors: {', '.join(texts)}"
         )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Status, canonical
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
@@ -164,8 +164,8 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
     """Add a message for every case with a dimensionless number that may overflow or underflow."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
-            number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)
-            faults.setdefault(int(j), f"expected {name} between {least} and {most}, got {number}; check the units")
+            between = f"expected {name} between {LEAST:g} and {1 / LEAST:g}, got {column[j]:.9g}"
+            faults.setdefault(int(j), f"{between}; check the units")
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:

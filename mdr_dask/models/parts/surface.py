@@ -14,7 +14,7 @@ from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, check_in_campaign
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables, anisotropic
-from mdr_dask.units import shown, shown_apart
+from mdr_dask.units import shown
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -143,10 +143,10 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
     beyond = []
     for name, end in zip(("longest_wavelength", "shortest_wavelength"), ends, strict=True):
         if end and not shortest * (1 - 1e-9) <= end <= longest * (1 + 1e-9):
-            given, limit = shown_apart("m", end, longest if end > longest else shortest)
+            limit = f"most {shown(longest, 'm', 9)}" if end > longest else f"least {shown(shortest, 'm', 9)}"
             beyond.append(
-                f"{file.name}: expected {name} of at {'most' if end > longest else 'least'} {limit}, where the "
-                f"spectrum ends, got {given} (`extrapolate: true` continues it by a power law)"
+                f"{file.name}: expected {name} of at {limit}, where the spectrum ends, got {shown(end, 'm', 9)} "
+                "(`extrapolate: true` continues it by a power law)"
             )
     if beyond:
         raise DataError("; ".join(beyond))
@@ -162,8 +162,8 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):
         if not np.any(line):
-            longest, shortest = spectrum.wavelengths
-            (last, least), (first, most) = shown_apart("m", length, shortest), shown_apart("m", length / modes, longest)
+            ends = (*spectrum.wavelengths, length, length / modes)
+            most, least, last, first = (shown(end, "m", 9) for end in ends)
             raise DataError(
                 f"{file.name}: expected wavelengths of the line in the range {least} to {most}, got {first} to {last}: "
                 "change length or points"

@@ -16,7 +16,7 @@ from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
 from mdr_dask.tables import read_table
-from mdr_dask.units import shown_apart
+from mdr_dask.units import shown
 
 
 class Wlf(Parameters):
@@ -32,7 +32,7 @@ class Wlf(Parameters):
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
         if lowest <= end:
-            got, limit = shown_apart("K", lowest, end)
+            got, limit = shown(lowest, "K", 9), shown(end, "K", 9)
             raise ValueError(f"expected a temperature above {limit}, where wlf diverges (at reference - c2), got {got}")
         return wlf_factor(temperature, self.reference, self.c1, self.c2)
 
@@ -76,7 +76,7 @@ class ShiftFactors(NamedByFile):
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
-            got, first, last = shown_apart("K", outside, known[0], known[-1])
+            got, first, last = (shown(float(each), "K", 9) for each in (outside, known[0], known[-1]))
             raise ValueError(
                 f"{self.file.name}: expected a temperature within the shift factors, {first} to {last}, got {got}"
             )

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 
 _LUBRICANT_EXPANSION = 0.6278  # expansion in 1/K times density in kg/m^3, both at 60 F (ASTM D1250, table 54D)
 
@@ -157,8 +156,8 @@ class Oil:
         """Return a message if a temperature is outside the range of the data, or an empty string."""
         if self.lowest <= temperature <= self.highest:
             return ""
-        got, lowest, highest = distinguishable(temperature, self.lowest, self.highest, digits=6)
-        return f"expected a temperature within the oil's data, {lowest} to {highest} K, got {got} K"
+        ends = f"{self.lowest:.9g} to {self.highest:.9g} K"
+        return f"expected a temperature within the oil's data, {ends}, got {temperature:.9g} K"
 
 
 #: Available oils, by name.

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.physics.jit import jit, jit_inline, last_until
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
 
@@ -169,9 +168,8 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     image = forward_transform(slope, nodes, breaks=tuple(r[1:-1]), tolerance=1e-12).value
     image_curve = _monotone(nodes, image)
     if image[-1] < depth:
-        got, end = distinguishable(depth, image[-1], digits=4)
         raise ValueError(
-            f"the contact reaches beyond the table: the largest possible depth is {end}, got {got}; "
+            f"the contact reaches beyond the table: the largest possible depth is {image[-1]:.9g}, got {depth:.9g}; "
             "extend the table or reduce the depth"
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))

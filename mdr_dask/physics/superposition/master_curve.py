@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.physics.superposition.posterior import BEND, ROUNDING, STEP_SCATTER, Curves, solve
 from mdr_dask.physics.superposition.sampling import CHAINS, draws
 
@@ -305,8 +305,7 @@ def rereference(
     """
     groups, size = result.groups, result.groups.size
     if not groups[0] <= reference <= groups[-1]:
-        got, low, high = distinguishable(reference, groups[0], groups[-1], digits=6)
-        raise DataError(f"expected a reference between {low} and {high}, got {got}")
+        raise DataError(f"expected a reference between {groups[0]:.9g} and {groups[-1]:.9g}, got {reference:.9g}")
     place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
     share = np.array([np.interp(place, places, unit) for unit in np.eye(size)])
     known = np.zeros(size) if law is None or reference in groups else law - at_reference

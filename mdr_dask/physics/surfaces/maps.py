@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft, sparse
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces.scans import Cut, averaged
 from mdr_dask.physics.surfaces.self_affine import noise_limit
 from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -72,8 +72,8 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
     """Raise DataError if the fraction of missing points exceeds `MOST_MISSING`."""
     count = int(np.count_nonzero(missing))
     if count > MOST_MISSING * missing.size:
-        share, most = distinguishable(100 * count / missing.size, 100 * MOST_MISSING)
-        raise DataError(f"expected at most {most} % of missing points (missing points are filled), got {share} %")
+        most, got = f"{100 * MOST_MISSING:g} % of missing points", f"{count} of {missing.size}"
+        raise DataError(f"expected at most {most} (missing points are filled), got {got}")
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
