@@ -11,7 +11,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -31,6 +31,8 @@ SEPARATORS = ("\t", ";", "|", ",", BLANKS)
 SHEET = "# sheet of a workbook: "
 #: Measured values count as equal up to this relative difference. Instruments print three digits.
 AGREE = 0.01
+#: A table without names and with more columns than this is a map.
+MOST_COLUMNS = 6
 NO_ROWS = "expected a line of names and at least one line of values"
 
 #: A column name that stands for a common logarithm: ``log10 q``, ``lg(q)``.
@@ -51,51 +53,22 @@ _MISSING = re.compile(
 _WORD = re.compile(r"(?!inf|nan)[^\W\d]{2}", re.IGNORECASE)
 
 Cells = NDArray[np.object_]
-
-
-class Problem(NamedTuple):
-    """A message about a cell, with the line and the column of the text where the cell begins, counted from 1.
-
-    In a workbook, `line` and `column` are 0.
-    """
-
-    line: int
-    column: int
-    what: str
+#: The `Column` of a column of a table, its unit, and whether its entries are common logarithms.
+Meaning = tuple[Column | None, str, bool]
 
 
 class Line(NamedTuple):
-    """A line of a table. Lines are counted from 1, in the text or in the sheet of a workbook."""
+    """The place of a line of a table, counted from 1 in the text or in the sheet of a workbook."""
 
     number: int
-    text: str
     sheet: str = ""
-    separator: str = ""
 
     def __str__(self) -> str:
         return f"sheet {self.sheet!r}, row {self.number}" if self.sheet else f"line {self.number}"
 
-    def problem(self, column: int, what: str) -> Problem:
-        """Return a problem of the cell with the index `column`. In a workbook, the message names the sheet and row."""
-        if self.sheet:
-            return Problem(0, 0, f"{self}: {what}")
-        place = 0
-        cells = _split(self.text, self.separator)
-        for cell in cells[:column]:
-            place = max(self.text.find(cell, place), place) + len(cell) + (self.separator != BLANKS)
-        return Problem(self.number, max(self.text.find("".join(cells[column : column + 1]), place), place) + 1, what)
-
-
-class TableError(DataError):
-    """A table that cannot be used. The message contains the name of the file and all problems."""
-
-    def __init__(self, source: str, problems: Sequence[Problem]) -> None:
-        super().__init__(source, tuple(problems))
-        self.problems = tuple(problems)
-
-    def __str__(self) -> str:
-        source = self.args[0]
-        return "\n".join(f"{source}:{f'{at}:{column}:' if at else ''} {what}" for at, column, what in self.problems)
+    def message(self, source: str, what: str) -> str:
+        """Return a message about this line of the file `source`."""
+        return f"{source}: {self}: {what}" if self.sheet else f"{source}:{self.number}: {what}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +77,8 @@ class Sheet:
 
     `cells` has the shape (rows, columns), and its numbers have decimal points. `lines` contains the line from which
     each row was read. `names` is empty if the table has no names. `units` has an empty text for a column without a
-    unit. `head` is the line of names, or the first row of numbers if there are no names. `notes` contains the first
-    cell of each line of text below the numbers.
+    unit. `head` is the line of names, or the first row of numbers if there are no names. `remark` lists the lines of
+    text below the numbers.
     """
 
     source: str
@@ -114,13 +87,7 @@ class Sheet:
     cells: Cells
     lines: tuple[Line, ...]
     head: Line
-    notes: tuple[str, ...] = ()
-
-    @property
-    def remark(self) -> str:
-        """A text that lists the lines below the numbers, or an empty text if there are no such lines."""
-        shown = dict.fromkeys(repr(text[:60]) for text in self.notes)
-        return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
+    remark: str = ""
 
 
 class Read(dict[str, FloatArray]):
@@ -185,16 +152,16 @@ def _workbook(content: bytes, source: str) -> str:
         raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None
     lines = []
     texts = [" ".join(cell.split()) for sheet in sheets.values() for cell in sheet.to_numpy().flat if type(cell) is str]
-    kinds = {kind for text in texts if len(kind := _decimals(text)) == 1}
+    kinds = {kind for text in texts if len(kind := decimal_marks([text])) == 1}
     for name, sheet in sheets.items():
         frame = sheet.fillna("").map(lambda cell: _of_workbook(cell, kinds))
         lines += [SHEET + str(name), *("\t".join(row) for row in frame.to_numpy())]
     return "\n".join(lines)
 
 
-def _decimals(text: str) -> str:
-    """Return the possible decimal marks of a number, such as ``,`` for ``30,0`` and ``.,`` for ``3,158``."""
-    return "".join(mark for mark, form in _DECIMALS.items() if re.fullmatch(form, text))
+def decimal_marks(texts: Sequence[str]) -> str:
+    """Return the decimal marks that all numbers may have, such as ``,`` for ``30,0`` and ``.,`` for ``3,158``."""
+    return "".join(mark for mark, form in _DECIMALS.items() if all(map(re.compile(form).fullmatch, texts)))
 
 
 def _of_workbook(cell: object, kinds: set[str]) -> str:
@@ -204,7 +171,7 @@ def _of_workbook(cell: object, kinds: set[str]) -> str:
     ``3,158`` has two possible marks, and is read as a number only if `kinds` contains exactly one mark.
     """
     text = " ".join(str(cell).split())
-    kind = _decimals(text) if isinstance(cell, str) else ""
+    kind = decimal_marks([text]) if isinstance(cell, str) else ""
     if len(kind) == 2 and re.search("[.,]", text):
         if len(kinds) != 1:
             return f"{text} (as text, with an uncertain decimal mark)"
@@ -212,17 +179,16 @@ def _of_workbook(cell: object, kinds: set[str]) -> str:
     return text.replace(".", "").replace(",", ".") if kind == "," else text
 
 
-def _lines(text: str) -> list[Line]:
-    """Return the lines of a text that are not empty."""
-    lines, sheet, before = [], "", 0
+def _lines(text: str) -> Iterator[tuple[Line, str]]:
+    """Yield the lines of a text that are not empty."""
+    sheet, before = "", 0
     # a name in quotation marks may contain a line break
     text = re.sub(r'(?:^|(?<=[\n;,\t]))"[^"]*"(?=[;,\t\r\n])', lambda found: re.sub(r"\s+", " ", found[0]), text)
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
         if line.startswith(SHEET):
             sheet, before = line.removeprefix(SHEET), number
         elif line.strip(" ,;\t-=_+|"):  # neither empty nor a line of dashes
-            lines.append(Line(number - before, line, sheet))
-    return lines
+            yield Line(number - before, sheet), line
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -265,14 +231,19 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     Groups of columns with the same names that stand side by side are joined one below the other. If cells may be words,
     the caller must give the function `is_name`, which returns whether a text is the name of a column.
     """
-    grid = _grid(source, _lines(text))
-    head = _head_of_words(grid, is_name) if is_name else _head(grid)
-    rows, stated, notes = _body(grid, head)
-    names, units = _names_and_units(grid, head)
-    _require_even(grid, rows, len(units), head)
-    cells = _with_points(grid, rows)[:, : len(units)]
+    grid = _grid(source, list(_lines(text)))
+    if is_name is None:
+        data, numeric = _lines_of_numbers(grid)
+        head = _head(grid, data, numeric.size)
+    else:
+        head = _head_of_words(grid, is_name)
+        data, numeric = np.ones(len(grid.cells), dtype=bool), grid.number[head.begin :].mean(axis=0) >= 0.5
+    rows, stated, remark = _body(grid, head, data, numeric)
     first = grid.lines[rows[0] if head.names is None else head.names]
-    sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, notes)
+    names, units = _names_and_units(grid, head) if head.names is not None else ((), ("",) * numeric.size)
+    _require_even(grid, rows, len(units), numeric, first)
+    cells = _with_points(grid, rows)[:, : len(units)]
+    sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, remark)
     places = [place for place, name in enumerate(names) if name or cells[:, place].any()]
     known = [(plain(names[place]), units[place]) for place in places]
     for count in range(2, len(known) // 2 + 1):
@@ -280,7 +251,7 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
             return _from_groups(grid, sheet, head.labels, np.reshape(places, (-1, count)))
     if not names or not all(stated) or any(is_called(name, "temperature") for name in names):
         return sheet
-    temperatures, of_temperature = zip(*(each for each in stated if each), strict=True)
+    temperatures, of_temperature = zip(*filter(None, stated), strict=True)
     return replace(
         sheet,
         names=(*names, "temperature"),
@@ -298,6 +269,7 @@ class _Grid:
     """
 
     source: str
+    separator: str
     cells: Cells
     lines: tuple[Line, ...]
     length: NDArray[np.int64]
@@ -305,10 +277,10 @@ class _Grid:
     number: BoolArray
     word: BoolArray
 
-    def require(self, wrong: Sequence[int], column: int, what: str) -> None:
-        """Raise TableError if `wrong` contains lines. The message shows the first line and counts the other lines."""
+    def require(self, wrong: Sequence[int], what: str) -> None:
+        """Raise DataError if `wrong` contains lines. The message shows the first line and counts the other lines."""
         if len(wrong):
-            raise TableError(self.source, [self.lines[wrong[0]].problem(column, what + _further(len(wrong)))])
+            raise DataError(self.lines[wrong[0]].message(self.source, what + _further(len(wrong))))
 
 
 def _further(count: int) -> str:
@@ -316,64 +288,61 @@ def _further(count: int) -> str:
     return f" (and in {count - 1} more line{'s' if count > 2 else ''})" if count > 1 else ""
 
 
-def _grid(source: str, every: Sequence[Line]) -> _Grid:
+def _grid(source: str, every: Sequence[tuple[Line, str]]) -> _Grid:
     """Split lines into cells. Comments are left out, unless they contain the names of the columns."""
-    texts = [line for line in every if line.text.lstrip()[0] not in COMMENT]
+    texts = [(line, text) for line, text in every if text.lstrip()[0] not in COMMENT]
     if not texts:
-        raise TableError(source, [Problem(1, 1, NO_ROWS)])
-    separator = _separator([line.text for line in texts])
-    lines = [line._replace(separator=separator) for line in texts]
-    rows = [_split(line.text, separator) for line in lines]
+        raise DataError(Line(1).message(source, NO_ROWS))
+    lines = [line for line, _ in texts]
+    separator = _separator([text for _, text in texts])
+    rows = [_split(text, separator) for _, text in texts]
     has_names = not any(map(_NUMBER.fullmatch, rows[0])) and not _are_units(rows[0])
-    for comment in [] if has_names else reversed(every[: every.index(texts[0])]):
-        split = ((each, _split(comment.text.lstrip(COMMENT + " "), each)) for each in SEPARATORS)
-        fitting = [(each, names) for each, names in split if len(names) == len(rows[0]) > 1]
-        if not fitting or any(map(_NUMBER.fullmatch, fitting[0][1])):
+    for line, comment in [] if has_names else reversed(every[: every.index(texts[0])]):
+        split = (_split(comment.lstrip(COMMENT + " "), each) for each in SEPARATORS)
+        names = next((names for names in split if len(names) == len(rows[0]) > 1), [])
+        if not names or any(map(_NUMBER.fullmatch, names)):
             break
-        rows, lines = [fitting[0][1], *rows], [comment._replace(separator=fitting[0][0]), *lines]
+        rows, lines = [names, *rows], [line, *lines]
     width = 1 + max((place for row in rows for place, cell in enumerate(row) if cell), default=0)
     cells = np.array([[*row[:width], *[""] * (width - len(row))] for row in rows], dtype=object)
     number = np.array([[bool(_NUMBER.fullmatch(cell)) for cell in row] for row in cells])
     word = ~number
     word[word] = [not _MISSING.fullmatch(cell) for cell in cells[word]]
     length = np.array([min(len(row), width) for row in rows])
-    return _Grid(source, cells, tuple(lines), length, cells != "", number, word)
+    return _Grid(source, separator, cells, tuple(lines), length, cells != "", number, word)
 
 
 class _Head(NamedTuple):
     """The indices of the line of names, of the line of units, and of the line of labels above groups of columns.
 
-    An index is None if the table has no such line. `numeric` is a mask of the columns of numbers, and `data` is a mask
-    of the lines of numbers. Numbers are read from the line `begin` on.
+    An index is None if the table has no such line. Numbers are read from the line `begin` on.
     """
 
     names: int | None
     units: int | None
     labels: int | None
     begin: int
-    numeric: BoolArray
-    data: BoolArray
 
 
-def _head(grid: _Grid) -> _Head:
+def _head(grid: _Grid, data: BoolArray, width: int) -> _Head:
     """Find the names and units in the lines of text above the numbers.
 
-    A candidate is a line with as many cells as most lines of numbers. Without candidates, the last line above the
-    numbers contains the names. If the last candidate contains names with units, there is no line of units. If a
-    candidate other than the first is a line of units, the candidate above this line contains the names. Otherwise the
-    last candidate contains the names, and the candidate above the names may be the line of units.
+    `data` is a mask of the lines of numbers, and `width` is the number of cells of most of these lines. A candidate is
+    a line with `width` cells. Without candidates, the last line above the numbers contains the names. If the last
+    candidate contains names with units, there is no line of units. If a candidate other than the first is a line of
+    units, the candidate above this line contains the names. Otherwise the last candidate contains the names, and the
+    candidate above the names may be the line of units.
     """
-    data, numeric = _lines_of_numbers(grid)
-    full = np.flatnonzero(data & (grid.length == numeric.size))
+    full = np.flatnonzero(data & (grid.length == width))
     if not full.size:
-        grid.require([len(grid.cells) - 1], 0, NO_ROWS)
+        grid.require([len(grid.cells) - 1], NO_ROWS)
     begin = int(full[0])
     above = [row for row in range(begin) if not data[row]]
     if not above and begin + 2 < data.size and not data[begin + 1]:  # the numbers are labels of pairs of columns
         above, begin = [begin, begin + 1], begin + 2
     if not above:
-        return _Head(None, None, None, begin, numeric, data)
-    wide = [row for row in above if grid.length[row] == numeric.size] or above[-1:]
+        return _Head(None, None, None, begin)
+    wide = [row for row in above if grid.length[row] == width] or above[-1:]
     units = next((row for row in wide[:0:-1] if _are_units(grid.cells[row])), None)
     if units != wide[-1] and any(unit and is_unit(unit) for _, unit in map(split_unit, grid.cells[wide[-1]])):
         units = None
@@ -381,7 +350,7 @@ def _head(grid: _Grid) -> _Head:
         wide = wide[: wide.index(units)]
     elif len(wide) > 1 and _are_units(grid.cells[wide[-2]]):
         units = wide.pop(-2)
-    return _Head(wide[-1], units, wide[-2] if len(wide) > 1 else None, above[-1] + 1, numeric, data)
+    return _Head(wide[-1], units, wide[-2] if len(wide) > 1 else None, above[-1] + 1)
 
 
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
@@ -413,24 +382,25 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
     """Find the line of names of a table whose cells may be words: the first line with a known name."""
     count = len(grid.cells)
     names = next((row for row in range(count) if any(is_name(split_unit(cell)[0]) for cell in grid.cells[row])), 0)
-    grid.require([names] if grid.number[names].any() else [], 0, "expected a line of names")
+    grid.require([names] if grid.number[names].any() else [], "expected a line of names")
     units = names + 1 if names + 1 < count and _are_units(grid.cells[names + 1]) else None
     begin = names + 1 if units is None else units + 1
-    grid.require([names] if begin == count else [], 0, NO_ROWS)
-    numeric = np.asarray(grid.number[begin:].mean(axis=0) >= 0.5)
-    return _Head(names, units, None, begin, numeric, np.ones(count, dtype=bool))
+    grid.require([names] if begin == count else [], NO_ROWS)
+    return _Head(names, units, None, begin)
 
 
-def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
-    """Return the indices of the lines of numbers, the temperature stated above each line, and the notes at the end.
+def _body(
+    grid: _Grid, head: _Head, data: BoolArray, numeric: BoolArray
+) -> tuple[list[int], list[tuple[str, str] | None], str]:
+    """Return the indices of the lines of numbers, the temperature stated above each line, and a remark on the end.
 
-    TableError is raised for text between two lines of numbers, unless this text repeats the line of names.
+    DataError is raised for text between two lines of numbers, unless this text repeats the line of names.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []
     temperature = _stated(grid, range(head.begin))
-    for row in range(head.begin, head.data.size):
-        if not head.data[row]:
+    for row in range(head.begin, data.size):
+        if not data[row]:
             between.append(row)
             continue
         if head.names is not None and any(np.array_equal(grid.cells[each], grid.cells[head.names]) for each in between):
@@ -444,11 +414,12 @@ def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | N
     wrong += [row for row in between if grid.number[row, first[row]]]
     if wrong:
         words = np.flatnonzero(grid.word[wrong[0]])
-        column = int(next(iter([*(place for place in words if head.numeric[place : place + 1].any()), *words]), 0))
+        column = next(iter([*words[np.isin(words, np.flatnonzero(numeric))], *words]), 0)
         several = len({grid.lines[row].sheet for row in [*wrong, *kept]}) > 1
         remedy = " (all sheets of a workbook are read as one table: delete the sheets of other tables)" * several
-        grid.require(wrong, column, f"expected a line of numbers, got {grid.cells[wrong[0], column][:60]!r}{remedy}")
-    return kept, stated, tuple(grid.cells[row, first[row]] for row in between)
+        grid.require(wrong, f"expected a line of numbers, got {grid.cells[wrong[0], column][:60]!r}{remedy}")
+    below = dict.fromkeys(repr(grid.cells[row, first[row]][:60]) for row in between)
+    return kept, stated, f"lines below the numbers, left out: {', '.join(below)}" if below else ""
 
 
 def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
@@ -459,23 +430,20 @@ def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
 
 def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names and the units of the columns. A line of units takes precedence over units in the names."""
-    if head.names is None:
-        return (), ("",) * head.numeric.size
     parts = [split_unit(name) for name in grid.cells[head.names][: grid.length[head.names]]]
     below = [""] * len(parts) if head.units is None else [cell.strip("[](){}<> ") for cell in grid.cells[head.units]]
     units = (in_degrees(one or own) for one, (_, own) in zip(below, parts, strict=False))
     return tuple(name for name, _ in parts), tuple(units)
 
 
-def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
-    """Raise TableError if a line ends before the last column of numbers, or has more cells than the table has names."""
-    first = grid.lines[rows[0] if head.names is None else head.names]
-    blanks = width > head.numeric.size and first.separator == BLANKS  # a name that contains a blank became two cells
+def _require_even(grid: _Grid, rows: Sequence[int], width: int, numeric: BoolArray, first: Line) -> None:
+    """Raise DataError if a line ends before the last column of numbers, or has more cells than the table has names."""
+    blanks = width > numeric.size and grid.separator == BLANKS  # a name that contains a blank became two cells
     wrong = [
         row
         for row in rows
         if grid.filled[row, width:].any()
-        or head.numeric[grid.length[row] : width].any()
+        or numeric[grid.length[row] : width].any()
         or (blanks and grid.length[row] < width)
     ]
     if wrong:
@@ -484,32 +452,29 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
         if grid.word[wrong[0]].any():
             hint = " (write a missing number as one word, such as nan, or put semicolons between the cells)"
         hint = " (write names without blanks, or put tabs between the columns)" if blanks else hint
-        grid.require(wrong, 0, f"expected {width} values as in {first}, got {length}{hint}")
+        grid.require(wrong, f"expected {width} values as in {first}, got {length}{hint}")
 
 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
     """Return the cells of `rows`, with all numbers written with decimal points and without marks between thousands.
 
-    TableError is raised if some numbers have a decimal point and other numbers have a decimal comma.
+    DataError is raised if some numbers have a decimal point and other numbers have a decimal comma.
     """
     cells, number = grid.cells[rows], grid.number[rows]
     texts: list[str] = cells[number].tolist()
-    with_mark = {mark: [place for place, text in enumerate(texts) if mark in text] for mark in _DECIMALS}
-    forms = {mark: re.compile(form) for mark, form in _DECIMALS.items()}
-    unlike = {
-        mark: [place for place, text in enumerate(texts) if not form.fullmatch(text)] for mark, form in forms.items()
-    }
-    possible = [mark for mark in forms if not unlike[mark]]
-    if not possible or (len(possible) == 2 and all(with_mark.values())):
-        places = np.argwhere(number)
-        point, comma = (places[(unlike[other] or with_mark[mark])[0]] for mark, other in (".,", ",."))
+    count = {mark: sum(mark in text for text in texts) for mark in _DECIMALS}
+    possible = decimal_marks(texts)
+    if not possible or (len(possible) == 2 and all(count.values())):
+        of = np.argwhere(number)[:, 0]
+        ranks = [[(decimal_marks([text]) == mark, mark in text) for text in texts] for mark in ".,"]
+        point, comma = (rank.index(max(rank)) for rank in ranks)
         what = (
-            f"expected decimal commas or decimal points, got both ({cells[tuple(point)]!r}, and "
-            f"{cells[tuple(comma)]!r} in {grid.lines[rows[comma[0]]]}): write one kind of decimals"
+            f"expected decimal commas or decimal points, got both ({texts[point]!r}, and {texts[comma]!r} in "
+            f"{grid.lines[rows[of[comma]]]}): write one kind of decimals"
         )
-        grid.require([rows[point[0]]], int(point[1]), what)
-    decimal = max(possible, key=lambda mark: len(with_mark[mark]))
-    kept = str.maketrans(decimal, ".", "".join(_DECIMALS).replace(decimal, "") + _GROUPS)
+        grid.require([rows[of[point]]], what)
+    decimal = max(possible, key=lambda mark: count[mark])
+    kept = str.maketrans(decimal, ".", ".,".replace(decimal, "") + _GROUPS)
     cells[number] = [text.translate(kept) for text in texts]
     return cells
 
@@ -529,7 +494,7 @@ def _from_groups(grid: _Grid, sheet: Sheet, labels: int | None, groups: IntArray
         known = [found for text in texts if (found := re.search(_TEMPERATURE, text))]
         if not len(known) * share == len(above) > 0 or len({each[2] for each in known}) > 1:
             what = f"expected a temperature above each of the {len(groups)} groups of columns, such as '20 degC'"
-            raise TableError(sheet.source, [sheet.head.problem(0, what)])
+            raise DataError(sheet.head.message(sheet.source, what))
         names, units = [*names, "temperature"], [*units, in_degrees(known[0][2])]
         extra = [[each[1].replace(",", ".")] for each in known]
     filled = [
@@ -551,7 +516,7 @@ def _are_units(row: Sequence[str]) -> bool:
     return bool(filled) and (2 * known >= len(filled) or all(re.fullmatch(r"\[.*\]", text) for text in filled))
 
 
-def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
+def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
     """Return, for each column of the sheet, its `Column`, its unit, and whether its entries are common logarithms.
 
     The `Column` is one of `columns`, or None for an unknown column of the sheet. In a sheet without names, `columns`
@@ -562,14 +527,14 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
         count = len(sheet.units)
         if count > len(columns):
             what = f"expected the names of the {count} columns in the first line"
-            raise TableError(sheet.source, [sheet.head.problem(0, what)])
+            raise DataError(sheet.head.message(sheet.source, what))
         return [(column, unit, False) for column, unit in zip(columns, sheet.units, strict=False)]
     found = []
-    for place, (name, unit) in enumerate(zip(sheet.names, sheet.units, strict=True)):
+    for name, unit in zip(sheet.names, sheet.units, strict=True):
         try:
             column, written = match(name, unit, columns)
         except ValueError as error:
-            raise TableError(sheet.source, [sheet.head.problem(place, str(error))]) from None
+            raise DataError(sheet.head.message(sheet.source, str(error))) from None
         logarithm = _LOGARITHM.fullmatch(name)
         if column is None and logarithm:
             inner, own = split_unit(re.sub(r"^\((.*)\)$", r"\1", logarithm[1].strip()))
@@ -595,27 +560,50 @@ def read_table(
     """Read the requested columns of a table in SI, each of shape (rows,).
 
     A table without names must have its columns in the order of `columns`. If `allow_missing` is true, entries without
-    a digit become NaN. A TableError contains at most one problem of each column. `ways` contains groups of column
-    names, and the table must contain all columns of at least one group. The first complete group is read, and columns
-    that belong only to other groups are not used.
+    a digit become NaN. The message of a DataError contains at most one problem of each column. `ways` contains groups
+    of column names, and the table must contain all columns of at least one group. The first complete group is read, and
+    columns that belong only to other groups are not used.
     """
-    sheet, read, problems = read_sheet(text, source), Read(), []
+    sheet = read_sheet(text, source)
     meanings = matched(sheet, columns)
-    present = {column.name for column, _, _ in meanings if column is not None}
+    present = {column.name for column, _, _ in meanings if column}
     way = next((way for way in ways if present.issuperset(way)), None)
-    if way is not None:
-        others = {name for each in ways for name in each}.difference(way)
-        columns = [column for column in columns if column.name not in others]
-        meanings = [(each if each in columns else None, unit, is_logarithm) for each, unit, is_logarithm in meanings]
-        present -= others
+    others = {name for each in ways for name in each}.difference(way) if way is not None else set()
+    columns = [column for column in columns if column.name not in others]
+    meanings = [(each if each in columns else None, unit, is_logarithm) for each, unit, is_logarithm in meanings]
     absent = [column for column in columns if column.name not in present]
-    unknown = [(place, sheet.names[place]) for place, (column, _, _) in enumerate(meanings) if column is None]
-    for place, name in unknown:
-        unit = sheet.units[place]
-        alike = [column.name for column in absent if not unit or fits(unit, column)]
-        if hint := similar(name, [column.name for column in absent]) or nearest(name, alike):
-            problems.append(sheet.head.problem(place, f"unknown column {name!r}{hint}"))
-    taken: dict[str, int] = {}
+    read, problems = _converted(sheet, meanings, allow_missing)
+    problems = [*_misspelt(sheet, meanings, absent), *problems]
+    unknown = [name for name, (column, _, _) in zip(sheet.names, meanings, strict=False) if column is None]
+    lacking = [f"a column {column.name}" for column in absent if column.needed]
+    lacking += [", or ".join(" and ".join(each) for each in ways)] if way is None and ways else []
+    if lacking and not problems:
+        got = f", got {listed(unknown)}" if unknown else ""
+        problems = [sheet.head.message(source, f"expected {' and '.join(lacking)}{got}")]
+    if problems:
+        raise DataError("\n".join(problems))
+    by_unit = [
+        f"{name!r} is taken as {column.name}, because of its unit"
+        for name, (column, unit, is_logarithm) in zip(sheet.names, meanings, strict=False)
+        if column and not is_logarithm and match(name, unit, columns)[0] is not column
+    ]
+    unused = ", ".join(filter(None, unknown))
+    read.remark = "; ".join(filter(None, (*by_unit, f"not used: {unused}" if unused else "", sheet.remark)))
+    return read
+
+
+def _misspelt(sheet: Sheet, meanings: Sequence[Meaning], absent: Sequence[Column]) -> Iterator[str]:
+    """Yield a message for each unknown column whose name is similar to the name of an absent column."""
+    for name, unit, (column, _, _) in zip(sheet.names, sheet.units, meanings, strict=False):
+        alike = [each.name for each in absent if not unit or fits(unit, each)]
+        hint = "" if column else similar(name, [each.name for each in absent]) or nearest(name, alike)
+        if hint:
+            yield sheet.head.message(sheet.source, f"unknown column {name!r}{hint}")
+
+
+def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -> tuple[Read, list[str]]:
+    """Return the columns with a meaning in SI, and the problems of these columns."""
+    read, problems, taken = Read(), [], {}
     for place, (column, written, is_logarithm) in enumerate(meanings):
         if column is None:
             continue
@@ -623,7 +611,7 @@ def read_table(
             unit = _unit(written, column)
         except ValueError as error:
             got = f", got {f'{sheet.names[place]} [{written}]'!r}" if sheet.names and written else ""
-            problems.append(sheet.head.problem(place, f"column {column.name}: {error}{got}"))
+            problems.append(sheet.head.message(sheet.source, f"column {column.name}: {error}{got}"))
             continue
         values, wrong = _values(sheet, place, column, unit, is_logarithm, allow_missing)
         problems += wrong
@@ -632,28 +620,15 @@ def read_table(
         elif not wrong and not np.allclose(values, read[column.name], rtol=AGREE, atol=0, equal_nan=True):
             both = f"{sheet.names[taken[column.name]]!r} and {sheet.names[place]!r}"
             what = f"column {column.name} is given twice: {both} disagree: delete one of the two"
-            problems.append(sheet.head.problem(place, what))
-    lacking = [f"a column {column.name}" for column in absent if column.needed]
-    lacking += [", or ".join(" and ".join(each) for each in ways)] if way is None and ways else []
-    if lacking and not problems:
-        got = f", got {listed([name for _, name in unknown])}" if unknown else ""
-        problems.append(sheet.head.problem(0, f"expected {' and '.join(lacking)}{got}"))
-    if problems:
-        raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
-    unused = [name for _, name in unknown if name]
-    by_unit = [
-        f"{name!r} is taken as {column.name}, because of its unit"
-        for name, (column, unit, is_logarithm) in zip(sheet.names, meanings, strict=False)
-        if column and not is_logarithm and match(name, unit, columns)[0] is not column
-    ]
-    parts = (*by_unit, f"not used: {', '.join(unused)}" if unused else "", sheet.remark)
-    read.remark = "; ".join(filter(None, parts))
-    read.unused = {
-        sheet.names[place]: (sheet.units[place], _values_or_nan(sheet.cells[:, place])) for place, _ in unknown
-    }
+            problems.append(sheet.head.message(sheet.source, what))
     read.lines = sheet.lines
     read.headings = {name: sheet.names[place] if sheet.names else "" for name, place in taken.items()}
-    return read
+    read.unused = {
+        name: (unit, _floats(cells))
+        for name, unit, cells, (column, _, _) in zip(sheet.names, sheet.units, sheet.cells.T, meanings, strict=False)
+        if column is None
+    }
+    return read, problems
 
 
 def listed(names: Sequence[str]) -> str:
@@ -682,43 +657,38 @@ def _unit(written: str, column: Column) -> str:
 
 def _values(
     sheet: Sheet, place: int, column: Column, unit: str, is_logarithm: bool, allow_missing: bool
-) -> tuple[FloatArray, list[Problem]]:
+) -> tuple[FloatArray, list[str]]:
     """Return the values of a column in SI, and a list that contains the first problem or is empty."""
-    values, wrong = np.full(len(sheet.cells), np.nan), []
     before, factor, zero = factors(unit, column.unit)
 
-    def limit(text: str, si: float) -> str:
-        return f"{text} {(si / before - zero) / factor:.6g}{f' {unit}' if si or zero else ''}"
-
-    for row, text in enumerate(sheet.cells[:, place]):
-        if allow_missing and not re.search(r"\d", text):
-            continue
-        if not _NUMBER.fullmatch(text):
-            hint = " (write errors in a column of their own)" if re.search("±|[+][/-]", text) else ""
-            hint = (
-                " (write units in the line of names)"
-                if re.fullmatch(r"[+-]?[\d.,]+ ?[^\W\d]\S*|.*\d ?%", text)
-                else hint
-            )
-            wrong.append((row, f"expected a number, got {text[:60]!r}{hint}"))
-            continue
+    def in_si(text: str) -> float:
         exact = repr(10.0 ** float(text)) if is_logarithm and abs(float(text)) < 300 else text
-        value = values[row] = before * (scaled(exact, factor) + zero)
-        got = repr(f"{text[:60]} {unit}".strip())
-        if not math.isfinite(value):
-            wrong.append((row, f"expected a finite number, got {got}"))
-        elif column.above is not None and not value > column.above:
-            wrong.append((row, f"expected {limit('a value above', column.above)}, got {got}"))
-        elif column.least is not None and not value >= column.least:
-            wrong.append((row, f"expected {limit('at least', column.least)}, got {got}"))
-    problems = [
-        sheet.lines[row].problem(place, f"column {column.name}: {what}{_further(len(wrong))}")
-        for row, what in wrong[:1]
-    ]
-    return values, problems
+        return before * (scaled(exact, factor) + zero)
+
+    texts = sheet.cells[:, place]
+    values = np.array([in_si(text) if _NUMBER.fullmatch(text) else math.nan for text in texts])
+    low = ~((values > (-math.inf if column.above is None else column.above)) & (values < math.inf))
+    low |= ~(values >= (-math.inf if column.least is None else column.least))
+    rows = [row for row in np.flatnonzero(low) if not allow_missing or re.search(r"\d", texts[row])]
+    if not rows:
+        return values, []
+    text, value = texts[rows[0]][:60], values[rows[0]]
+    bound, limit = ("at least", column.least) if column.above is None else ("a value above", column.above)
+    if np.isnan(value):
+        hint = " (write errors in a column of their own)" if re.search("±|[+][/-]", text) else ""
+        is_quantity = re.fullmatch(r"[+-]?[\d.,]+ ?[^\W\d]\S*|.*\d ?%", text)
+        hint = " (write units in the line of names)" if is_quantity else hint
+        what = f"expected a number, got {text!r}{hint}"
+    elif limit is None or not math.isfinite(value):
+        what = f"expected a finite number, got {f'{text} {unit}'.strip()!r}"
+    else:
+        written = f"{(limit / before - zero) / factor:.6g}{f' {unit}' if limit or zero else ''}"
+        what = f"expected {bound} {written}, got {f'{text} {unit}'.strip()!r}"
+    what = f"column {column.name}: {what}{_further(len(rows))}"
+    return values, [sheet.lines[rows[0]].message(sheet.source, what)]
 
 
-def _values_or_nan(cells: Cells) -> FloatArray:
+def _floats(cells: Cells) -> FloatArray:
     """Return cells as numbers, with NaN for cells that are not numbers."""
     texts: list[str] = cells.ravel().tolist()
     return np.array([float(text) if _NUMBER.fullmatch(text) else math.nan for text in texts]).reshape(cells.shape)
@@ -726,22 +696,16 @@ def _values_or_nan(cells: Cells) -> FloatArray:
 
 def numbers(sheet: Sheet) -> FloatArray:
     """Return the cells of a table as numbers, with NaN for cells without a digit and for columns without numbers."""
-    values = _values_or_nan(sheet.cells)
+    values = _floats(sheet.cells)
     is_numeric = ~np.all(np.isnan(values), axis=0)
-    wrong = [
-        (row, place)
-        for row, place in np.argwhere(np.isnan(values) & is_numeric)
-        if re.search(r"\d", sheet.cells[row, place])
-    ]
+    places = np.argwhere(np.isnan(values) & is_numeric)
+    wrong = [(row, place) for row, place in places if re.search(r"\d", sheet.cells[row, place])]
     if wrong:
         row, place = wrong[0]
-        what = f"expected a number, got {sheet.cells[row, place][:60]!r}{_further(len(wrong))}"
-        raise TableError(sheet.source, [sheet.lines[row].problem(int(place), what)])
+        name = f"column {sheet.names[place]}: " if sheet.names else ""
+        what = f"{name}expected a number, got {sheet.cells[row, place][:60]!r}{_further(len(wrong))}"
+        raise DataError(sheet.lines[row].message(sheet.source, what))
     return values
-
-
-#: `described` treats a table without names and with more columns than this as a map.
-MOST_DESCRIBED = 6
 
 
 def described(text: str, source: str) -> str:
@@ -749,7 +713,7 @@ def described(text: str, source: str) -> str:
     sheet = read_sheet(text, source)
     columns = numbers(sheet).T
     rows = f"{len(sheet.cells)} rows"
-    if not sheet.names and len(columns) > MOST_DESCRIBED:
+    if not sheet.names and len(columns) > MOST_COLUMNS:
         return f"{rows} x {len(columns)} columns, {np.nanmin(columns):.4g} to {np.nanmax(columns):.4g}"
     names = sheet.names or [f"column {place}" for place in range(1, len(columns) + 1)]
     ranges = []

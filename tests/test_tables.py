@@ -1,15 +1,13 @@
 """Reading of tables: equivalent layouts, and one message for each mistake."""
 
-import pickle
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mdr_dask.errors import MdrDaskError
+from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.headings import Column
-from mdr_dask.tables import TableError, read_table
+from mdr_dask.tables import read_table
 
 COLUMNS = (
     Column("frequency", "rad/s", ("f", "omega"), above=0),
@@ -67,63 +65,62 @@ def test_frequencies_are_angular_ones(heading, value, expected):
 
 #: `$` is replaced by ``column storage modulus: ``
 WRONG = {
-    "nothing": ("", "1:1: expected a line of names and at least one line of values"),
-    "comments only": ("# f\n", "1:1: expected a line of names and at least one line of values"),
-    "names only": ("f [Hz],E' [Pa]\n", "1:1: expected a line of names and at least one line of values"),
-    "no unit": ("f [Hz],E'\n1,2\n", "1:8: $expected its unit, such as 'storage modulus [MPa]' in the first line"),
-    "capitals of a unit": ("f [Hz],E' [mpa]\n1,2\n", "1:8: $unknown unit 'mpa' (did you mean 'MPa'?)"),
-    "unit of another kind": ("f [Hz],E' [mm]\n1,2\n", "1:8: $expected a pressure (such as '10 MPa')"),
+    "nothing": ("", "1: expected a line of names and at least one line of values"),
+    "comments only": ("# f\n", "1: expected a line of names and at least one line of values"),
+    "names only": ("f [Hz],E' [Pa]\n", "1: expected a line of names and at least one line of values"),
+    "no unit": ("f [Hz],E'\n1,2\n", "1: $expected its unit, such as 'storage modulus [MPa]' in the first line"),
+    "capitals of a unit": ("f [Hz],E' [mpa]\n1,2\n", "1: $unknown unit 'mpa' (did you mean 'MPa'?)"),
+    "unit of another kind": ("f [Hz],E' [mm]\n1,2\n", "1: $expected a pressure (such as '10 MPa')"),
     "dimension on a number": (
         "f [Hz],E' [Pa],tan delta [MPa]\n1,2,3\n",
-        "1:16: column tan delta: expected a pure number",
+        "1: column tan delta: expected a pure number",
     ),
     "unknown column": (
         "f [Hz],E' [Pa],tan delda\n1,2,3\n",
-        "1:16: unknown column 'tan delda' (did you mean 'tan delta'?)",
+        "1: unknown column 'tan delda' (did you mean 'tan delta'?)",
     ),
-    "missing column": ("f [Hz],torque [N]\n1,5\n", "1:1: expected a column storage modulus, got torque"),
+    "missing column": ("f [Hz],torque [N]\n1,5\n", "1: expected a column storage modulus, got torque"),
     "twice": (
         "f [Hz],omega [Hz],E' [Pa]\n1,2,3\n",
-        "1:8: column frequency is given twice: 'f' and 'omega' disagree: delete one of the two",
+        "1: column frequency is given twice: 'f' and 'omega' disagree: delete one of the two",
     ),
-    "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3:1: expected 2 values as in line 1, got 1"),
-    "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3:3: $expected a number, got 'high'"),
-    "empty": ("f [Hz],E' [Pa]\n1,2\n3,\n", "3:3: $expected a number, got ''"),
-    "nan": ("f [Hz],E' [Pa]\n1,nan\n3,4\n", "2:3: $expected a number, got 'nan'"),
-    "negative": ("f [Hz],E' [MPa]\n1,2\n3,-4\n", "3:3: $expected a value above 0, got '-4 MPa'"),
+    "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3: expected 2 values as in line 1, got 1"),
+    "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3: $expected a number, got 'high'"),
+    "empty": ("f [Hz],E' [Pa]\n1,2\n3,\n", "3: $expected a number, got ''"),
+    "nan": ("f [Hz],E' [Pa]\n1,nan\n3,4\n", "2: $expected a number, got 'nan'"),
+    "negative": ("f [Hz],E' [MPa]\n1,2\n3,-4\n", "3: $expected a value above 0, got '-4 MPa'"),
     "below absolute zero": (
         "f [Hz],E' [Pa],T [C]\n1,2,-300\n",
-        "2:5: column temperature: expected a value above -273.15 degC, got '-300 degC'",
+        "2: column temperature: expected a value above -273.15 degC, got '-300 degC'",
     ),
-    "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2:3: $expected a finite number"),
+    "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2: $expected a finite number"),
     "decimal comma in commas": (
         "f [Hz],E' [Pa]\n1,5,2\n",
-        "2:1: expected 2 values as in line 1, got 3 (put semicolons between the values if they have decimal commas)",
+        "2: expected 2 values as in line 1, got 3 (put semicolons between the values if they have decimal commas)",
     ),
     "missing number of two words": (
         "a b c\n1 0 3\n1 0 No Data\n",
-        "3:1: expected 3 values as in line 1, got 4 (write a mis",
+        "3: expected 3 values as in line 1, got 4 (write a mis",
     ),
-    "no names": ("1,2,3,4,5\n1,2,3,4,5\n", "1:1: expected the names of the 5 columns in the first line"),
-    "long cell": ("f [Hz],E' [Pa]\n1," + "9" * 200_000 + "\n", "2:3: $expected a number"),
+    "no names": ("1,2,3,4,5\n1,2,3,4,5\n", "1: expected the names of the 5 columns in the first line"),
+    "long cell": ("f [Hz],E' [Pa]\n1," + "9" * 200_000 + "\n", "2: $expected a number"),
 }
 
 
 @pytest.mark.parametrize("kind", WRONG)
 def test_what_is_wrong_is_one_sentence_with_its_place(kind):
     text, sentence = WRONG[kind]
-    with pytest.raises(TableError) as caught:
+    with pytest.raises(DataError) as caught:
         read_table(text, "a.csv", COLUMNS)
     expected = "a.csv:" + sentence.replace("$", "column storage modulus: ")
     assert str(caught.value).splitlines()[0].startswith(expected)
-    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
 def test_each_column_has_one_message():
-    with pytest.raises(TableError) as caught:
+    with pytest.raises(DataError) as caught:
         read_table("f [Hz],E' [Pa]\n" + "-1,x\n" * 20, "a.csv", COLUMNS)
     frequency, modulus = str(caught.value).splitlines()
-    assert frequency.startswith("a.csv:2:1: column frequency: expected a value above 0, got '-1 Hz'")
+    assert frequency.startswith("a.csv:2: column frequency: expected a value above 0, got '-1 Hz'")
     assert modulus.endswith("expected a number, got 'x' (and in 19 more lines)")
 
 
@@ -144,7 +141,7 @@ def test_a_given_unit_serves_a_table_without_one():
     assert read_table("x\n5\n", "a.csv", [column])["x"] == 0.005
     assert read_table("5\n6\n", "a.csv", [column])["x"][1] == 0.006
     assert read_table("x [mm]\n5\n", "a.csv", [column])["x"] == 0.005
-    with pytest.raises(TableError, match="the file states um, got the unit 'mm'"):
+    with pytest.raises(DataError, match="the file states um, got the unit 'mm'"):
         read_table("x [um]\n5\n", "a.csv", [column])
 
 

@@ -13,14 +13,14 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """A position in a file. Lines and columns count from 1."""
+    """A position in a file. Lines and columns count from 1. The column is 0 if the message names the column."""
 
     source: str
     line: int
-    column: int
+    column: int = 0
 
     def __str__(self) -> str:
-        return f"{self.source}:{self.line}:{self.column}"
+        return f"{self.source}:{self.line}{f':{self.column}' if self.column else ''}"
 
 
 @dataclass(frozen=True, order=True)

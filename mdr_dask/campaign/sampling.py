@@ -14,7 +14,7 @@ from mdr_dask.campaign.spec import Drawn, LatinHypercubeSpec, SaltelliSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
 from mdr_dask.errors import DataError, did_you_mean, similar
 from mdr_dask.models.base import Parameters
-from mdr_dask.tables import Line, Sheet, TableError, decoded, read_sheet
+from mdr_dask.tables import Sheet, decoded, read_sheet
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
@@ -80,24 +80,19 @@ def tabled(
         if path.exists() and not path.is_file():
             raise OSError(errno.EINVAL, "not a regular file")
         text = decoded(path.read_bytes(), str(path))
+        sheet = read_sheet(text, name, lambda heading: heading.split(".")[0] in parameters.model_fields)
     except (OSError, DataError) as error:
         what = f"cannot read {path}: {error.strerror}" if isinstance(error, OSError) else str(error)
         problems.add(origin.place, origin.name, what)
-        return None
-    try:
-        sheet = read_sheet(text, name, lambda heading: heading.split(".")[0] in parameters.model_fields)
-    except TableError as error:
-        for line, column, what in error.problems:
-            problems.add(Place(name, line, column), "", what)
         return None
     indices = range(len(sheet.names))
     unused = [index for index in indices if _is_unused(sheet.names[index], sheet.cells[:, index], parameters)]
     used = [index for index in indices if index not in unused]
     malformed = [index for index in used if not _PATH.match(sheet.names[index])]
     for index in malformed:
-        problems.add(_place(name, sheet.head, index), "", _NOT_A_HEADING)
+        problems.add(Place(name, sheet.head.number), repr(sheet.names[index]), _NOT_A_HEADING)
     if not used:
-        problems.add(Place(name, 1, 1), "", _NOT_A_HEADING)
+        problems.add(Place(name, 1), "", _NOT_A_HEADING)
     if malformed or not used:
         return None
     if unused:
@@ -118,14 +113,10 @@ def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters
 def _column(name: str, sheet: Sheet, index: int) -> Variation:
     path = tuple(sheet.names[index].split("."))
     items = [
-        Item(_value(text, sheet.units[index]), Origin(dotted(path), _place(name, line, index)), text)
+        Item(_value(text, sheet.units[index]), Origin(dotted(path), Place(name, line.number)), text)
         for line, text in zip(sheet.lines, sheet.cells[:, index], strict=True)
     ]
-    return Variation(path, Origin(dotted(path), _place(name, sheet.head, index)), tuple(items))
-
-
-def _place(name: str, line: Line, index: int) -> Place:
-    return Place(name, *line.problem(index, "")[:2])
+    return Variation(path, Origin(dotted(path), Place(name, sheet.head.number)), tuple(items))
 
 
 def _value(text: str, unit: str) -> Any:

@@ -120,9 +120,9 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
             worst = int(np.flatnonzero(off)[0])
             unit = str(held.attrs.get("units", "1"))
             measured_at, *known = (shown(float(value), unit, 9) for value in (wanted[worst], *ends))
-            place = f"{measured.source}:{measured.lines[worst].number}"
             hint = "" if held.ndim else " only (delete the column to use this value)"
-            raise DataError(f"{place}: {name} is {measured_at}, but this study has {' to '.join(known)}{hint}")
+            what = f"{name} is {measured_at}, but this study has {' to '.join(known)}{hint}"
+            raise DataError(measured.lines[worst].message(measured.source, what))
     return dataset
 
 

@@ -85,7 +85,7 @@ def test_a_table_gives_the_cases(tmp_path):
 )
 def test_a_column_within_a_parameter_says_what_the_file_lacks(tmp_path, column, message):
     (tmp_path / "cases.csv").write_text(f"normal_force [N],{column}\n1,0.5\n2,0.6\n")
-    with pytest.raises(CampaignError, match=f"cases.csv:1:18: {column}: {message}"):
+    with pytest.raises(CampaignError, match=f"cases.csv:1: {column}: {message}"):
         read("", "sampling: {table: cases.csv}\n", tmp_path)
 
 

@@ -315,7 +315,7 @@ def test_bad_profiles_give_one_error(tmp_path):
     files = profiles(tmp_path)
     assert "expected both surface_1 and surface_2 or neither" in refused(surface_1=files["surface_1"])
     (tmp_path / "bad.csv").write_text("x [m], z [m]\n1, 2\n3, 2x\n")
-    assert "bad.csv:3:4: column z: expected a number, got '2x'" in refused(
+    assert "bad.csv:3: column z: expected a number, got '2x'" in refused(
         **files | {"surface_2": {"profile": str(tmp_path / "bad.csv")}}
     )
     assert "expected a contact width 2a of at most" in refused(**files | {"normal_force": 1e7})

@@ -95,7 +95,7 @@ parameters:
         ("surface: {spectrum: road.csv}", "profile: road.csv", "write surface: {profile: ...}"),
         ("spectrum: road.csv", "longest_wavelength: 1 mm", "expected spectrum, or "),
         ("road.csv}", "road.csv, shortest_wavelength: 1 um}", "`extrapolate: true` continues it by a power law"),
-        ("spectrum: road.csv", "spectrum: low.csv", "low.csv:3:3: column C2D: expected a value above 0, got '-1 m^4'"),
+        ("spectrum: road.csv", "spectrum: low.csv", "low.csv:3: column C2D: expected a value above 0, got '-1 m^4'"),
     ],
 )
 def test_a_mistake_is_one_message_with_its_place(tmp_path, old, new, message):

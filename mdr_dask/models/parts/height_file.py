@@ -14,7 +14,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
-from mdr_dask.tables import numbers, read_sheet, read_table
+from mdr_dask.tables import AGREE, MOST_COLUMNS, numbers, read_sheet, read_table
 from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
 
 #: File name extensions of text tables and of workbooks.
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
-SAME = 0.01
-"""Relative difference up to which two lengths count as equal, because numbers in files are rounded."""
-MOST_COLUMNS = 6
-"""A file with at most this many columns holds a line scan or a table of x, y and z; a map has more columns."""
 
 
 class Units(NamedTuple):
@@ -157,7 +153,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
         sources = {"its positions": length, "its heading": stated, f"`{option}`": given}
         known = [(source, length) for source, length in sources.items() if length]
         for source, length in known[1:]:
-            if abs(length - known[0][1]) > SAME * known[0][1]:
+            if abs(length - known[0][1]) > AGREE * known[0][1]:
                 raise DataError(
                     f"{file.name}: the spacing is {shown(known[0][1], 'm')} in {known[0][0]} and "
                     f"{shown(length, 'm')} in {source}: leave out `{option}` or correct the file"
@@ -177,7 +173,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
 
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
-    if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
+    if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > AGREE:
         raise DataError(
             f"{file.name}: the file states {stated}, got {given!r}: leave out `{option}` or correct the file"
         )

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
 from mdr_dask.models.parts.height_file import Scan, Units, read_scan
-from mdr_dask.models.parts.surface_files import doubts_of_line
+from mdr_dask.models.parts.surface_files import SPACING, UNIT, X_UNIT, doubts_of_line
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
@@ -23,15 +23,9 @@ class ProfileFile(NamedByFile):
     file: NamedFile = Field(
         description="file with two columns x, z; SurfaceTopography reads other formats if it is installed"
     )
-    unit: str = Field(default="", description="unit of the heights, if the file does not state it")
-    x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
-    spacing: float | None = quantity(
-        "m",
-        "distance between neighbouring points, for a file of heights without positions",
-        usual="1 um",
-        default=None,
-        gt=0,
-    )
+    unit: str = UNIT
+    x_unit: str = X_UNIT
+    spacing: float | None = SPACING
     detrend: Literal["none", "mean", "line", "parabola"] = Field(
         default="mean", description="polynomial that is subtracted from the heights"
     )

@@ -17,7 +17,7 @@ from mdr_dask.headings import Column, is_called, plain
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
 from mdr_dask.models.parts.temperature import Law
-from mdr_dask.tables import Read, TableError, read_sheet, read_table
+from mdr_dask.tables import Read, read_sheet, read_table
 from mdr_dask.units import shown
 
 #: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
@@ -253,7 +253,7 @@ def _table(chosen: ModulusTable) -> Read:
     )
     try:
         table = read_table(content, name, columns, allow_missing=True, ways=WAYS)
-    except TableError as problem:
+    except DataError as problem:
         headings = read_sheet(content, name).names
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
         if has["time"] and not has["frequency"]:

@@ -81,18 +81,24 @@ class SpectrumTables(Files):
         return tuple(_tabulated(file) for file in self.files)
 
 
+#: Options of all files with heights.
+SPACING = quantity(
+    "m",
+    "distance between neighbouring points along x, for a file of heights without positions",
+    usual="1 um",
+    default=None,
+    gt=0,
+)
+UNIT = Field(default="", description="unit of the heights, if the file does not state it")
+X_UNIT = Field(default="", description="unit of the positions, if the file does not state it")
+
+
 class HeightFiles(Files):
     """Files with heights of a surface: line scans or maps."""
 
-    spacing: float | None = quantity(
-        "m",
-        "distance between neighbouring points along x, for files of heights without positions",
-        usual="1 um",
-        default=None,
-        gt=0,
-    )
-    unit: str = Field(default="", description="unit of the heights, if the file does not state it")
-    x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
+    spacing: float | None = SPACING
+    unit: str = UNIT
+    x_unit: str = X_UNIT
     window: Literal["hann", "none"] = Field(
         default="hann", description="window for the Fourier transform; write none only if the heights are periodic"
     )
