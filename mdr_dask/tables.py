@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -107,9 +108,8 @@ class Read(dict[str, FloatArray]):
         known = np.isfinite(np.array([*self.values()])).all(axis=0)
         if known.all():
             return
-        for name, column in self.items():
-            self[name] = column[known]
-        self.lines = tuple(line for line, is_known in zip(self.lines, known, strict=True) if is_known)
+        self.update({name: column[known] for name, column in self.items()})
+        self.lines = tuple(compress(self.lines, known))
         missing = f"rows without a number are left out: {np.count_nonzero(~known)}"
         self.remark = "; ".join(filter(None, (self.remark, missing)))
 
@@ -280,10 +280,10 @@ class _Grid:
     def require(self, wrong: Sequence[int], what: str) -> None:
         """Raise DataError if `wrong` contains lines. The message shows the first line and counts the other lines."""
         if len(wrong):
-            raise DataError(self.lines[wrong[0]].message(self.source, what + _further(len(wrong))))
+            raise DataError(self.lines[wrong[0]].message(self.source, what + further(len(wrong))))
 
 
-def _further(count: int) -> str:
+def further(count: int) -> str:
     """Return a text such as `` (and in 2 more lines)`` for a problem in 3 lines."""
     return f" (and in {count - 1} more line{'s' if count > 2 else ''})" if count > 1 else ""
 
@@ -667,9 +667,9 @@ def _values(
 
     texts = sheet.cells[:, place]
     values = np.array([in_si(text) if _NUMBER.fullmatch(text) else math.nan for text in texts])
-    low = ~((values > (-math.inf if column.above is None else column.above)) & (values < math.inf))
-    low |= ~(values >= (-math.inf if column.least is None else column.least))
-    rows = [row for row in np.flatnonzero(low) if not allow_missing or re.search(r"\d", texts[row])]
+    above, least = (-math.inf if end is None else end for end in (column.above, column.least))
+    fits_bounds = (values > above) & (values >= least) & (values < math.inf)
+    rows = [row for row in np.flatnonzero(~fits_bounds) if not allow_missing or re.search(r"\d", texts[row])]
     if not rows:
         return values, []
     text, value = texts[rows[0]][:60], values[rows[0]]
@@ -684,7 +684,7 @@ def _values(
     else:
         written = f"{(limit / before - zero) / factor:.6g}{f' {unit}' if limit or zero else ''}"
         what = f"expected {bound} {written}, got {f'{text} {unit}'.strip()!r}"
-    what = f"column {column.name}: {what}{_further(len(rows))}"
+    what = f"column {column.name}: {what}{further(len(rows))}"
     return values, [sheet.lines[rows[0]].message(sheet.source, what)]
 
 
@@ -703,7 +703,7 @@ def numbers(sheet: Sheet) -> FloatArray:
     if wrong:
         row, place = wrong[0]
         name = f"column {sheet.names[place]}: " if sheet.names else ""
-        what = f"{name}expected a number, got {sheet.cells[row, place][:60]!r}{_further(len(wrong))}"
+        what = f"{name}expected a number, got {sheet.cells[row, place][:60]!r}{further(len(wrong))}"
         raise DataError(sheet.lines[row].message(sheet.source, what))
     return values
 

@@ -16,7 +16,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.numbers import numbers_of
-from mdr_dask.tables import AGREE, Line, Read, Sheet, listed, matched, read_sheet, read_table
+from mdr_dask.tables import AGREE, Line, Read, Sheet, further, listed, matched, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
@@ -31,8 +31,6 @@ LARGEST = 10**6
 SAME = 1e-6
 #: The reason why the fit refuses a table with errors that are zero.
 ZERO = "the fit needs standard errors above 0: delete the column of errors, so that the fit estimates them"
-#: A message names at most this number of rows outside the ranges of a study.
-FEW = 3
 
 
 @dataclass(frozen=True)
@@ -250,11 +248,11 @@ def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
         for line, value in zip(found.lines, found.conditions[name], strict=True)
         if not low - AGREE * abs(low) <= value <= high + AGREE * abs(high)
     ]
-    more = f", ... ({len(outside)} in all)" if len(outside) > FEW else ""
-    refused = (
-        f"outside the ranges of the study, so that the fit will refuse the table: {'; '.join(outside[:FEW])}{more}"
-    )
-    yield refused if outside else "every row lies within the ranges of the study"
+    if outside:
+        first = outside[0] + further(len(outside))
+        yield f"outside the ranges of the study, so that the fit will refuse the table: {first}"
+    else:
+        yield "every row lies within the ranges of the study"
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:

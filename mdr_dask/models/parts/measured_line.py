@@ -9,8 +9,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
-from mdr_dask.models.parts.height_file import Scan, Units, read_scan
-from mdr_dask.models.parts.surface_files import SPACING, UNIT, X_UNIT, doubts_of_line
+from mdr_dask.models.parts.surface_files import SPACING, UNIT, X_UNIT, doubts_of_line, scan_of
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
@@ -58,13 +57,8 @@ class ProfileFile(NamedByFile):
             f"{line.height.size} points, {shown(line.length, 'm')} long, rms height {shown(height, 'm')}, "
             f"rms slope {slope:.3g}"
         )
-        remarks = (statistics, *_scan(self).remarks, *doubts_of_line(line, self.detrend))
+        remarks = (statistics, *scan_of(self, self.file).remarks, *doubts_of_line(line, self.detrend))
         return tuple(f"profile {self.file.name}: {remark}" for remark in remarks)
-
-
-@lru_cache(maxsize=16)
-def _scan(profile: ProfileFile) -> Scan:
-    return read_scan(profile.file, Units(profile.unit, profile.x_unit, profile.spacing))
 
 
 @lru_cache(maxsize=16)
@@ -72,6 +66,6 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
     """Return one period of the measured line. Raise DataError if the file contains no line."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    scan = _scan(profile)
+    scan = scan_of(profile, profile.file)
     band = profile.shortest_wavelength or 0.0, profile.longest_wavelength or 0.0
     return measured_line(scan.position, scan.height, profile.detrend, profile.taper, *band)

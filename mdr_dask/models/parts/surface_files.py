@@ -18,6 +18,7 @@ from mdr_dask.tables import matched, read_sheet, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
+    from mdr_dask.models.parts.measured_line import ProfileFile
     from mdr_dask.physics.surfaces.maps import MapSpectrum
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -26,12 +27,7 @@ CUT_ERROR = 0.05  # assumed relative error of each point, if a table contains th
 # A surface counts as isotropic if its anisotropy does not exceed this value. The slopes along x and y then differ by at
 # most about a quarter.
 MOST_ANISOTROPY = 0.25
-# A map has stripes if waves along x or y have more than this many times the mean power of all waves of equal length.
-STRIPES = 10.0
 FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of the mean square height
-# If more than this fraction of the points lie far from their neighbours, these points belong to the surface and are not
-# outliers.
-MOST_OUTLIERS = 0.05
 
 #: Columns of a table that contains a spectrum.
 COLUMNS = (
@@ -178,8 +174,9 @@ def _tabulated(file: DataFile) -> Found:
 
 
 @lru_cache(maxsize=64)
-def _scan(scans: ScanFiles, file: DataFile) -> Scan:
-    return read_scan(file, Units(scans.unit, scans.x_unit, scans.spacing))
+def scan_of(options: ScanFiles | ProfileFile, file: DataFile) -> Scan:
+    """Return the positions and heights of a scan."""
+    return read_scan(file, Units(options.unit, options.x_unit, options.spacing))
 
 
 @lru_cache(maxsize=64)
@@ -187,7 +184,7 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
     """Return a scan without its trend."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    scan = _scan(scans, file)
+    scan = scan_of(scans, file)
     with file.in_errors():
         return measured_line(scan.position, scan.height, scans.detrend)
 
@@ -231,7 +228,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
         cut = cut_of_lines([line], scans.window == "hann")
         limit = noise_limit(cut, NOISE_SLOPE, NOISE_TAIL)
         spectrum, error = of_cut(cut.until(limit))
-    remarks = (*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend))
+    remarks = (*scan_of(scans, file).remarks, *doubts_of_line(line, scans.detrend))
     return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, remarks, error)
 
 
@@ -285,7 +282,14 @@ class LevelledMap(NamedTuple):
 @lru_cache(maxsize=16)
 def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
     """Return height parameters and spectrum of one map."""
-    from mdr_dask.physics.surfaces.maps import filled, outliers, require_points, spectrum_of_map, without_trend
+    from mdr_dask.physics.surfaces.maps import (
+        MOST_MISSING,
+        filled,
+        outliers,
+        require_points,
+        spectrum_of_map,
+        without_trend,
+    )
 
     surface, remarks = read_map(file, Units(maps.unit, maps.x_unit, maps.spacing, maps.spacing_y))
     with file.in_errors():
@@ -295,7 +299,7 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
             remarks = (*remarks, f"missing points filled: {missing}")
         far = outliers(surface)
         count = int(np.count_nonzero(far))
-        if count > MOST_OUTLIERS * far.size:
+        if count > MOST_MISSING * far.size:  # points of the surface, and too many to be replaced
             share = 100 * count / far.size
             remarks = (*remarks, f"{share:.2g} % of the points are far from their neighbours, too many to be outliers")
         elif count and maps.outliers == "fill":
@@ -309,12 +313,5 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
     if maps.detrend != "parabola":
         remarks = (*remarks, *_form(without_trend(surface, "plane").height, without_trend(surface, "parabola").height))
     remarks = (*remarks, *_steepness(float(np.sqrt(sum(spectrum.slopes[:2])))))
-    stripes = [name for name, power in zip("xy", spectrum.axes, strict=True) if power > STRIPES]
-    if stripes:
-        along = " and ".join(stripes)
-        remarks = (
-            *remarks,
-            f"waves along {along} have more than {STRIPES:.0f} times the usual power (are these scan lines?)",
-        )
     rms, mean = np.sqrt(np.nanmean(height**2)), np.nanmean(np.abs(height))
     return LevelledMap(float(rms), float(mean), spectrum, remarks)

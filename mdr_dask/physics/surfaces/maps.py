@@ -146,9 +146,7 @@ class MapSpectrum:
     windowed map. `slopes` contains the mean square of the slope along x, the mean square of the slope along y, and the
     mean product of both slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring,
     weighted by power. Both means are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of
-    straight profiles: first along x, then along y. `axes` contains, for each axis, the power of the wave along this
-    axis divided by the mean power of the waves in the same ring. The ratio is a median over the rings, divided by
-    ln(2): 1 for an isotropic surface.
+    straight profiles: first along x, then along y.
     """
 
     wavenumber: FloatArray
@@ -159,7 +157,6 @@ class MapSpectrum:
     slopes: tuple[float, float, float]
     angular: NDArray[np.complex128]
     cuts: tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-    axes: tuple[float, float]
 
     @property
     def rms_gradient(self) -> float:
@@ -276,7 +273,6 @@ def _rings(
         slopes=slopes,
         angular=np.array([second / safe, fourth / safe], dtype=np.complex128),
         cuts=cuts,
-        axes=(_axis(power[:, 0], ring[:, 0], total, count), _axis(power[0], ring[0], total, count)),
     )
 
 
@@ -291,15 +287,6 @@ def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
     """Return the wave numbers and the two-sided C_cut of straight profiles; `power` is the sum over q and -q."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
-
-
-def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the number in `MapSpectrum.axes` for one axis."""
-    number = np.arange(1.0, total.size + 1)
-    inner = (ring >= 4) & np.isin(ring, number[significant(number, total / number)])
-    k = ring[inner] - 1
-    ratio = power[inner] / (total[k] / count[k])
-    return float(np.median(ratio) / np.log(2)) if k.size else 1.0
 
 
 def wavenumbers(points: tuple[int, int], size: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
