@@ -160,13 +160,13 @@ READ = {
 #: Layouts that are refused, each with a part of the sentence that says what to change.
 REFUSED = {
     "points and commas": ("velocity [mm/s];mu\n1.5;0,322\n1.7;0,48\n",
-        FRICTION, "commas:2:1: expected decimal commas or decimal points, got both ('1.5', and '0,322' in line 2)"),
+        FRICTION, "commas:2: expected decimal commas or decimal points, got both ('1.5', and '0,322' in line 2)"),
     "millions and decimals": ("velocity [mm/s];mu\n1,000,000;0,48\n",
         FRICTION, "expected decimal commas or decimal points, got both ('1,000,000', and '0,48' in line 2)"),
     "thousands or decimals": ("velocity [mm/s];mu\n1.000;1,125\n2.000;1,250\n",
         FRICTION, "expected decimal commas or decimal points, got both"),
     "word between numbers": ("sample;f [Hz];E' [MPa]\nA;1;2\nB;bad;worse\nC;2;3\n",
-        DMA, "3:3: expected a line of numbers, got 'bad'"),
+        DMA, "3: expected a line of numbers, got 'bad'"),
     "names with blanks between blanks": ("Time (s)    Load point velocity (um/s)    Friction\n0   3   0.6\n",
         STEPS, "expected 5 values as in line 1, got 3 (write names without blanks, or put tabs between the columns)"),
     "pairs without temperatures": ("f [Hz],G' [MPa],f [Hz],G' [MPa]\n1,50,1,5\n2,60,2,6\n",
@@ -183,6 +183,6 @@ REFUSED = {
     "unknown unit in round brackets": ("v [mm/s],mu,Force (Newtons)\n1,0.5,10\n",
         FRICTION, "column normal force: unknown unit 'Newtons' (did you mean 'newton'?)"),
     "numbers below": ("v [mm/s];mu\n1;0,5\n2;0,6\n3;worn out\n",
-        FRICTION, "4:3: column friction coefficient: expected a number"),
+        FRICTION, "4: column friction coefficient: expected a number"),
 }
 # fmt: on

@@ -97,9 +97,7 @@ def test_an_anisotropic_map_needs_a_direction(tmp_path):
     stepped = HEIGHT.copy()
     stepped[:, 100:] += 2e-5
     np.save(tmp_path / "map.npy", stepped.T)
-    options["window"] = "hann"
-    assert "expected an isotropic surface" in refused(tmp_path, map=options)
-    assert "waves along y" in " ".join(surface(tmp_path, map=options | {"direction": "x"}).notes())
+    assert "expected an isotropic surface" in refused(tmp_path, map=options | {"window": "hann"})
 
 
 def test_noise_hides_no_grooves_and_few_waves_are_no_grooves(tmp_path):
