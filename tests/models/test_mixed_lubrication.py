@@ -233,7 +233,10 @@ def test_tables_without_valid_viscosities_are_refused(text, changes, message, tm
     ("changes", "message"),
     [
         ({"temperature": 293.15}, "expected a temperature within the oil's data, 313.15 to 373.15 K, got 293.15 K"),
-        ({"normal_force": 2e8}, "expected a contact width 2a of at most the length of the line, 0.00628318531 m, got 0.0"),
+        (
+            {"normal_force": 2e8},
+            "expected a contact width 2a of at most the length of the line, 0.00628318531 m, got 0.0",
+        ),
         ({"longest_wavelength": 1e-6, "shortest_wavelength": 1e-5}, "expected the longest wavelength above the"),
         (
             {"points": "auto", "shortest_wavelength": 1e-9},
