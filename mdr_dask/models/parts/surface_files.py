@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,6 @@ from mdr_dask.tables import matched, read_sheet, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
-    from mdr_dask.models.parts.measured_line import ProfileFile
     from mdr_dask.physics.surfaces.maps import MapSpectrum
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -174,8 +173,8 @@ def _tabulated(file: DataFile) -> Found:
 
 
 @lru_cache(maxsize=64)
-def scan_of(options: ScanFiles | ProfileFile, file: DataFile) -> Scan:
-    """Return the positions and heights of a scan."""
+def scan_of(options: Any, file: DataFile) -> Scan:
+    """Return the positions and heights of a scan. `options` has the attributes `unit`, `x_unit` and `spacing`."""
     return read_scan(file, Units(options.unit, options.x_unit, options.spacing))
 
 
