@@ -255,8 +255,8 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     errors. The result may be negative.
 
     `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
-    middle, 2 at the quarters, ... The shape of the means `groups` is (1 + groups, lines, values), as in `Mean.groups`,
-    and the shape of the discretisation errors `error` of these means is (lines, values).
+    middle, 2 at the quarters, ... `groups` contains the means described in `Mean.groups`, in an array with three axes:
+    group, line and value. `error`, shape (lines, values), contains the discretisation errors of the means.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

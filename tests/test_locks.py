@@ -47,7 +47,10 @@ def test_a_file_system_without_locks_is_named_and_a_claim_keeps_others_out(toy, 
     run(small(toy), url + "2")
     without_locks(monkeypatch, errno.ENOLCK)
     assert run(small(toy), url).done == 12
-    assert f"no locks on this file system ({os.strerror(errno.ENOLCK)}); the run makes a claim" in caplog.text
+    assert (
+        f"no locks on this file system ({os.strerror(errno.ENOLCK)}); the run creates a lock file instead"
+        in caplog.text
+    )
     assert run(small(toy), url).kept == 12
     with locks.acquire(url), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
         run(small(toy), url)
@@ -99,7 +102,7 @@ def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, buc
     files.write_bytes(bucket, ".claims/alone/000004.json", json.dumps(gone).encode())
     with locks.acquire(bucket) as hold:
         assert hold.claim == 5
-        assert "sign of life of process 1 on node7" in caplog.text
+        assert "heartbeat of process 1 on node7" in caplog.text
         with (
             pytest.raises(StoreBusyError, match="has ended or lost its lock"),
             store.while_locked(bucket, Lock("", "a" * 32, 4)),

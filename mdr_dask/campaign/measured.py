@@ -129,9 +129,10 @@ def scatter(measured: Measured, known: Mapping[str, ArrayLike]) -> Iterator[str]
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
     """Return the headings of columns with errors of the output, the unit of the errors, and whether they are relative.
 
-    The last of `columns` is the output. The unit is empty if one of the headings states a unit. Otherwise the unit
-    of the output is returned. Errors in percent are relative, unless the output is in percent as well. The heading
-    ``std``, which names no quantity, belongs to the nearest known column on its left.
+    The last of `columns` is the output. If no heading states a unit, the unit of the output is returned. If a heading
+    states a unit, the returned unit is empty, because the values are converted with the unit of the heading. Errors in
+    percent are relative, unless the output is in percent as well. The heading ``std``, which names no quantity, belongs
+    to the nearest known column on its left.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):

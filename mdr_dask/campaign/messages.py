@@ -88,7 +88,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """Return the path from a list to the entry that a message quotes, or ``()`` if the message quotes no entry."""
+    """Return the index of the list entry that a message quotes, as a path, or ``()`` if the message quotes no entry."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 

@@ -165,7 +165,7 @@ class _Maker:
                 yield self._frame(rows)[0]
 
     def order(self) -> NDArray[np.intp]:
-        """Return the position in the unsorted table of each row of the sorted table."""
+        """Return, for each row of the sorted table, the position of this row in the unsorted table."""
         import pandas as pd
 
         question = self._question

@@ -1,9 +1,9 @@
 """Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
 If the file system has locks, the operating system releases the locks of a process when the process ends. On other file
-systems, and at URLs, a run makes a claim. To make a claim, the run creates a file that only one process can create, and
-then regularly writes a second file as a sign of life. A run also holds a lock named the gate while it searches for
-active runs or lays out the study.
+systems, and at URLs, a run creates a lock file, called a claim, which only one process can create. The run then writes
+a second file, the heartbeat, at regular intervals. A run also holds a lock named the gate while it searches for active
+runs or lays out the study.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ try:
 except ImportError:  # runs then make claims
     fcntl = None  # type: ignore[assignment]
 
-#: `BEAT`: time in s between two signs of life of a run with a claim. `SILENCE`: time in s without a sign of life after
+#: `BEAT`: time in s between two heartbeats of a run with a claim. `SILENCE`: time in s without a heartbeat after
 #: which the run counts as ended. The clocks of two machines may differ by some seconds.
 BEAT = 10.0
 SILENCE = 60.0
@@ -204,7 +204,9 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
             if error.errno not in NO_LOCKS:
                 raise StoreError(f"{url}: locking it failed: {error.strerror}") from None
             if not name:
-                log.warning("%s: no locks on this file system (%s); the run makes a claim", url, error.strerror)
+                log.warning(
+                    "%s: no locks on this file system (%s); the run creates a lock file instead", url, error.strerror
+                )
             yield held.enter_context(_claimed(url, name))
         else:
             yield held.enter_context(_registered(url, name))
@@ -374,7 +376,7 @@ def _retire(url: str, name: str) -> None:
 
 
 def _claim(name: str, number: int, ending: str = "json") -> str:
-    """Return the name of the file of a claim or, with the ending ``life``, of its signs of life."""
+    """Return the name of the file of a claim or, with the ending ``life``, of its heartbeat."""
     return f"{CLAIMS}{name or 'alone'}/{number:06d}.{ending}"
 
 
@@ -385,7 +387,7 @@ def _numbers(url: str, name: str) -> list[int]:
 
 @contextmanager
 def _claimed(url: str, name: str) -> Iterator[Lock]:
-    """Hold a claim, and write signs of life until the context ends."""
+    """Hold a claim, and write heartbeats until the context ends."""
     owner = uuid.uuid4().hex
     number = _make_claim(url, name, owner)
     ended = threading.Event()
@@ -428,20 +430,20 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim has recently written a sign of life, or writes a sign of life soon."""
+    """Return whether the owner of a claim has recently written a heartbeat, or writes a heartbeat soon."""
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _claim(name, number, "life")) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:
         return True
     if not claim and read_bytes(url, _claim(name, number)) is None:
         return True  # the owner has just ended, and another run may have started
-    log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
+    log.warning("%s: waiting %g s for a heartbeat of %s", url, 2 * BEAT, claim.get("who", "another process"))
     time.sleep(2 * BEAT)
     return (_read_claim(url, _claim(name, number, "life")) or claim) != last
 
 
 def _read_claim(url: str, name: str) -> dict[str, Any]:
-    """Return the content of a claim or a sign of life. The content of a missing or incomplete file is empty."""
+    """Return the content of a lock file or heartbeat file. The content of a missing or incomplete file is empty."""
     try:
         return read_json(url, name) or {}
     except StoreError:

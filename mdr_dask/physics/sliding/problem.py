@@ -131,7 +131,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
     """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
-    # contact fraction and slope belong to a lattice depth, which may be the same on two grids
+    # contact fraction and slope are computed at a rounded depth; if two grids round alike, the change seems to be zero
     unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:

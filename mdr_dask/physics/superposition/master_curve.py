@@ -88,7 +88,7 @@ class Superposition:
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of all factors, horizontal then vertical, in decades squared, shape (2 groups, 2 groups)."""
+        """Covariance of all factors, horizontal then vertical, in decades squared."""
         return np.atleast_2d(np.cov(self.draws, rowvar=False))
 
     @property

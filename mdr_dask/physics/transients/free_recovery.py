@@ -260,7 +260,7 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 
 @jit_inline_uncounted
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
-    """Return five values at x: the gap, and the slope, curvature, derivative by the depth and rate of the gap.
+    """Return the gap at x, its slope and curvature along the line, and its derivatives with respect to depth and time.
 
     The gap is depth + h - u, positive where the line is above free elements with the displacement u.
     """
@@ -319,9 +319,10 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove a place of separation if elements from this place certainly have displacements below `pressed` at x.
+    """Delete the entries of `recovery` that cannot matter at or beyond x, where the line imposes a displacement.
 
-    `deepest` is the largest depth since the jump.
+    An entry is deleted if the elements that separated there certainly have smaller displacements at x than `pressed`,
+    the displacement that the line imposes at x. `deepest` is the largest depth since the jump.
     """
     kept = 0
     for k in range(recovery.count[0]):

@@ -160,7 +160,8 @@ def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, sta
             change = max(change, abs(terms[0, m] - last[m]))
         if line.periodic and change <= 1e-13 * abs(u):
             return True, u
-        for m in range(terms.size):  # continue with the strain that would repeat if the displacement repeated exactly
+        # the next sweep begins with the strains of a periodic state with this displacement
+        for m in range(terms.size):
             terms[0, m] = last[m] - (terms[0, m] - last[m]) / np.expm1(-1 / (deborah * solid.times[m]))
     return not line.periodic, u
 
