@@ -30,7 +30,7 @@ PUBLIC: dict[str, dict[str, str]] = {
     },
     "Transforms of the method of dimensionality reduction": {
         "mdr_dask.physics.mdr.transforms": "forward_transform",
-        "mdr_dask.physics.mdr.power_law_contact": "contact_radius depth normal_force stick_radius",
+        "mdr_dask.physics.mdr.power_law_contact": "contact_radius depth normal_force",
     },
     "Fretting wear": {
         "mdr_dask.physics.wear.exact": "exact",

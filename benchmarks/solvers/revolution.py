@@ -43,7 +43,7 @@ class Wearing(NamedTuple):
     def exact(self, accuracy: float) -> Found:
         """Return the worn profile by the exact rule, and its error."""
         (worn,) = exact(self.profile, self.stick, [self.amount], accuracy, constant_force=self.held)
-        return Found(worn.height(self.radii), worn.error("worn_profile", self.radii))
+        return Found(worn.height(self.radii), worn.error("height", self.radii))
 
     def by_blocks(self, cells: int) -> Found:
         """Return the worn profile for one block of load, in steps on a uniform grid."""
@@ -72,7 +72,7 @@ def wearing(slips: bool, held: bool, random: np.random.Generator) -> tuple[Weari
     case = Wearing(PowerProfile(power(random, -0.2, 0.9)), stick, power(random, -1, 1), held)
     (worn,) = exact(case.profile, stick, [case.amount], 1e-4, constant_force=held)
     case = case._replace(radii=np.linspace(0, 1.2 * worn.contact_radius, 400))
-    return case, Truth(worn.height(case.radii), worn.error("worn_profile", case.radii), case.scale)
+    return case, Truth(worn.height(case.radii), worn.error("height", case.radii), case.scale)
 
 
 SOLVERS = (

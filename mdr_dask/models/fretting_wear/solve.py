@@ -35,7 +35,7 @@ from mdr_dask.physics.wear.worn import Worn, virgin_load
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
 #: For each output that has another name in `Worn`, the name in `Worn`. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
-_RENAMED = {"contact_force": "normal_force"}
+_RENAMED = {"contact_force": "normal_force", "worn_profile": "height", "worn_image": "image"}
 #: Two tolerances for the error of the worn profile, divided by eta d0: the tolerance if the campaign states no
 #: accuracy, and the smallest tolerance of any solution.
 _USUAL, _FINEST = 1e-3, 1e-5
@@ -147,8 +147,8 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
         "depth": numbers.height,
         "wear_volume": numbers.length**2 * numbers.height,
         "normal_force": numbers.force,
-        "worn_profile": numbers.height,
-        "worn_image": numbers.height,
+        "height": numbers.height,
+        "image": numbers.height,
         "worn_depth": numbers.height,
         "pressure": numbers.force / numbers.length**2,
     }

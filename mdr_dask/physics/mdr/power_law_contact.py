@@ -42,13 +42,3 @@ def radius_from_force(force: ArrayLike, amplitude: ArrayLike, exponent: ArrayLik
     n = np.asarray(exponent, dtype=float)
     factor = 2.0 * np.asarray(E_star) * power_factor(n) * np.asarray(amplitude) * n / (n + 1.0)
     return np.asarray((np.asarray(force, dtype=float) / factor) ** (1.0 / (n + 1.0)))
-
-
-def stick_radius(slip_share: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return the relative stick radius c / a0 = (1 - eta)^(1/n) for the slip share eta (thesis eq. 6.7).
-
-    The slip share is eta = G* U0 / (mu E* d0), with the tangential displacement U0 and the depth d0. The contact radius
-    is a0. For eta >= 1 the whole contact slips, and the result is NaN.
-    """
-    rest = 1.0 - np.asarray(slip_share, dtype=float)
-    return np.where(rest > 0.0, np.maximum(rest, 0.0) ** (1.0 / np.asarray(exponent, dtype=float)), np.nan)

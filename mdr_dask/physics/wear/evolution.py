@@ -70,16 +70,13 @@ def settled(problem: Problem) -> Any:
     return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
 
 
-def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]:
-    """Return the number of contacts in the history before the given time, and the contact at this time.
-
-    If the history contains no contact at this time, the contact is computed by one or more additional time steps.
-    """
+def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
+    """Return the contact at a time, computed by additional time steps if the history contains no contact at it."""
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
-        return before, history[before]
+        return history[before]
     if time < np.finfo(np.float64).tiny:  # such a time counts as 0, because 1 / time would overflow
-        return 0, history[0]
+        return history[0]
     newton, past, next_time = _Newton(problem), list(history[:before]), time
     while past[-1].time < time:
         moment, _ = _try_step(problem, newton, past, next_time)
@@ -90,18 +87,7 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> tuple[int, Any]
         next_time = 0.5 * (past[-1].time + next_time)
         if next_time == past[-1].time:
             raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
-    return before, past[-1]
-
-
-def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
-    """Return the time integral of `rates` up to every contact in the history, by the BDF formulas of the steps."""
-    total = np.zeros(len(history))
-    for number in range(1, len(history)):
-        order = min(number, 3)
-        shares = _backward_shares(np.array([m.time for m in history[number - order : number + 1]][::-1]))
-        past = total[number - order : number][::-1]
-        total[number] = (rates[number] - shares[1:] @ past) / shares[0]
-    return total
+    return past[-1]
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: float) -> tuple[Any, float]:

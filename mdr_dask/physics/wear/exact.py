@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, integral_along, march, settled
+from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, march, settled
 from mdr_dask.physics.wear.rules import limit, limit_radius
-from mdr_dask.physics.wear.slip import BORDER_WEIGHT, GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
+from mdr_dask.physics.wear.slip import BORDER_WEIGHT, GrossSlip, Moment, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
     Scar,
     Worn,
@@ -40,10 +40,6 @@ COARSEST_OF_MOVING = 3e-4  # largest `accuracy` under constant force: longer ste
 ENDED = 1e4
 JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta in the panel next to the border exceeds this value
 ROUGHER = 4.0  # the error allowed in a time step grows by this factor from each solution to the next coarser solution
-#: The stated error of a radius is at least this fraction of the change of the radius in the last time step. All
-#: solutions have this error, because a position that the edge passes within a time step begins to wear only at the end
-#: of this step.
-EDGE = 0.2
 
 
 class Resolution(NamedTuple):
@@ -161,26 +157,6 @@ def operations(accuracy: float, *, constant_force: bool) -> float:
     return (2.0 if constant_force else 1.0) * steps * resolution.panels(5 if constant_force else 2).nodes.size ** 3
 
 
-class _Leg(NamedTuple):
-    """A part of an evolution with one `problem`. `before` is the energy dissipated before this part, divided by mu."""
-
-    problem: PartialSlip | GrossSlip
-    moments: Sequence[Any]
-    before: float = 0.0
-
-    @property
-    def end(self) -> float:
-        return float(self.moments[-1].time)
-
-    def at(self, time: float) -> tuple[Any, float, float]:
-        """Return the contact at a time, the dissipated energy divided by mu, and the least error of the radius."""
-        number, moment = at(self.problem, self.moments, time)
-        moments = [*self.moments[:number], moment]
-        energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
-        first, last = (self.problem.edge(self.moments[k].unknowns) for k in (max(number - 1, 0), number))
-        return moment, float(energy), EDGE * abs(last - first)
-
-
 def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
@@ -203,25 +179,21 @@ def _fretted(
             raise beyond_table(profile, c)
         return problem.border is None and bool(moment.unknowns[panels.mesh.order - 1] > JUMP)
 
-    legs, start, energy = [], None, 0.0
+    legs, start = [], None
     if constant_force:
         problem, start = problem.under_force(settled(problem))
         moments = march(problem, np.inf if late else early[-1], resolution.step, first, start, stops)
-        legs.append(_Leg(problem, moments))
-        energy = legs[0].at(moments[-1].time)[1]
+        legs.append((problem, moments))
         problem, start = problem.stop(moments[-1])
-    if early and not (legs and legs[0].end >= early[-1]):
-        moments = march(problem, early[-1], resolution.step, first, start, stops)
-        legs.append(_Leg(problem, moments, energy))
+    if early and not (legs and moments[-1].time >= early[-1]):
+        legs.append((problem, march(problem, early[-1], resolution.step, first, start, stops)))
     contacts = {}
     for time in early:
-        leg = legs[0] if time <= legs[0].end else legs[-1]
-        contacts[time] = _contact(leg, time)
-        rise = (contacts[time].depth - 1.0) / problem.eta
+        contact = _contact(*next(leg for leg in legs if time <= leg[1][-1].time), time)
+        rise = (contact.depth - 1.0) / problem.eta
         if constant_force and rise < resolution.flat:
-            border = max(_moved(profile, stick_radius, rise), stick_radius)
-            least_errors = {**contacts[time].least_errors, "stick_border": border - stick_radius}
-            contacts[time] = replace(contacts[time], stick_border=border, least_errors=least_errors)
+            contact = replace(contact, stick_border=max(_moved(profile, stick_radius, rise), stick_radius))
+        contacts[time] = contact
     if late:
         contacts |= dict.fromkeys(late, _end(problem, start) if start else limit(profile, c))
     return contacts
@@ -235,9 +207,7 @@ def _moved(profile: Profile, c: float, rise: float) -> float:
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
     """Return an upper bound of the contact radius under constant force."""
-    abscissa, weight = gauss(64)
-    x = stick_radius + (1.0 - stick_radius) * abscissa
-    slipping = (1.0 - stick_radius) * float((1.0 - profile.image(x)) @ weight)
+    slipping = virgin_load(profile, 1.0) - virgin_load(profile, stick_radius)
     deepest = 1.0 + slipping / stick_radius
     radius = 1.0 + 4.0 * (1.0 - stick_radius)  # enlarged until the profile is as high as the largest possible depth
     while float(profile.height(np.array([radius]))[0]) < deepest:
@@ -296,15 +266,13 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     return worn_by(profile, scar, border, scar.radius, depth, force, worn_volume(scar))
 
 
-def _contact(leg: _Leg, time: float) -> Worn:
+def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -> Worn:
     """Return the worn contact at one time in partial slip, computed from the values at the nodes."""
-    problem, (moment, energy, edge_error) = leg.problem, leg.at(time)
-    assert isinstance(problem, PartialSlip)
+    moment = at(problem, moments, time)
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.inner_radius
     square, unknowns, path = problem.body.width, moment.unknowns, moment.path
     y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
     (radii, reached, frozen_slope), slope = _frozen(problem, path), panels.slope @ y
-    last_border = problem.radius(path[0, -2:][0])
     border, a, depth = problem.radius(max(place, 0.0)), problem.edge(unknowns), 1.0 + eta * deeper
 
     def height(radius: FloatArray) -> FloatArray:
@@ -343,8 +311,6 @@ def _contact(leg: _Leg, time: float) -> Worn:
         height=height,
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, a, depth, border),
-        energy_volume=energy,
-        least_errors={"contact_radius": edge_error, "stick_border": EDGE * (border - last_border)},
     )
 
 
@@ -362,15 +328,13 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     sharpness = max(2.0 / float(np.log2(far / near)), 1.0) if near > 0.0 else 1.0
     problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
     if constant_force:
-        problem = replace(problem, force=problem.wear_rate(problem.start().unknowns))
-    leg = _Leg(problem, march(problem, wanted[-1], resolution.step, resolution.step))
-    return {path: _slid_contact(leg, path) for path in wanted}
+        problem = replace(problem, force=problem.normal_force(problem.start().unknowns))
+    moments = march(problem, wanted[-1], resolution.step, resolution.step)
+    return {path: _slid_contact(problem, at(problem, moments, path)) for path in wanted}
 
 
-def _slid_contact(leg: _Leg, path: float) -> Worn:
+def _slid_contact(problem: GrossSlip, moment: Moment) -> Worn:
     """Return the worn contact after one sliding distance. Outside the contact, the image is NaN."""
-    problem, (moment, energy, edge_error) = leg.problem, leg.at(path)
-    assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated
     image, a = problem.image(unknowns), problem.edge(unknowns)
 
@@ -388,12 +352,10 @@ def _slid_contact(leg: _Leg, path: float) -> Worn:
         contact_radius=a,
         stick_border=0.0,
         depth=float(image[-1]),
-        normal_force=problem.wear_rate(unknowns),
-        wear_volume=energy,  # in gross slip V = int F ds exactly
+        normal_force=problem.normal_force(unknowns),
+        wear_volume=float(np.pi * a**2 * panels.weights @ worn),
         worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
-        energy_volume=energy,
-        least_errors={"contact_radius": edge_error},
     )

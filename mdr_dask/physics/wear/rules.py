@@ -132,10 +132,7 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
         return np.asarray(profile.image_slope(x) * np.where(x <= 1.0, inside, rest - 1.0))
 
     scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
-    worn = worn_by(profile, scar, c, edge, 1.0, force, volume)
-    # by the wear law, the energy of the limiting profile is known; the fast rule does not determine the energy
-    energy = volume if rest == 0.0 else np.nan
-    return replace(worn, energy_volume=energy, relative_error=ERROR)
+    return replace(worn_by(profile, scar, c, edge, 1.0, force, volume), relative_error=ERROR)
 
 
 @jit_inline

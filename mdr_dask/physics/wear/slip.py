@@ -316,12 +316,6 @@ class PartialSlip:
         moved = _plateau_rise(self.body, path, place.border + place.width * self.panels.nodes)
         return SlipMoment(time, unknowns, worn, path, moved)
 
-    def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_b^a (d - g) y dx, which is the energy dissipated per cycle divided by mu."""
-        y, place = self.image(unknowns), self.place(unknowns)
-        root = np.sqrt(self.body.width * place.width)
-        return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
-
 
 def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
     """Return the problem at constant depth, with the virgin slip tabulated up to the radius `reach`."""
@@ -492,8 +486,8 @@ class GrossSlip:
         """Return f at the nodes."""
         return np.asarray(self.panels.full @ self.image(unknowns))
 
-    def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/ds = F_N = 2 int_0^a (d - g) dx."""
+    def normal_force(self, unknowns: FloatArray) -> float:
+        """Return F_N = 2 int_0^a (d - g) dx."""
         image = self.image(unknowns)
         # the last row of `full`, multiplied by u sqrt(1 - z), is the integral of u / (pi sqrt(z)) over z from 0 to 1
         load = (image[-1] - image) * np.sqrt(1.0 - self.panels.nodes)
@@ -512,7 +506,7 @@ class GrossSlip:
         """
         virgin = self.profile.height(self.edge(unknowns) * np.sqrt(self.panels.nodes))
         rows = self.worn(unknowns) - virgin - self._accumulated(unknowns, theta, known)
-        return rows if self.force is None else np.append(rows, self.wear_rate(unknowns) - self.force)
+        return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives of the residual with respect to g."""

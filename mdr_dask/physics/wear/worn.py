@@ -7,8 +7,7 @@ sigma0 / (4 U0 k E*). Heights f are measured upwards from the virgin apex. Wear 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,15 +18,9 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.refine import SAFETY
 
-#: Outputs that are functions of position, and the attributes of `Worn` that compute them; other outputs are numbers.
-FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
-
 JUMP_WIDTH = (
     1e-9  # a change of the image within this distance from a border, divided by the radius of the border, is a jump
 )
-#: The error of a function is the largest difference within this number of neighbouring points, because the difference
-#: at a single point may be zero by chance.
-REACH = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +40,9 @@ class Worn:
         Wear volume V, and the largest value of f - f0.
     height, image, pressure : callable, array -> array
         f(r), g(x) and p(r), for any position.
-    energy_volume : float
-        The dissipated energy divided by mu, in the unit of volume. According to the wear law, this volume equals the
-        wear volume. If the energy is unknown, the value is NaN.
     rougher : tuple of Worn
         One or two coarser solutions of the same contact. The errors are estimated from the differences between this
         solution and the coarser solutions.
-    least_errors : mapping of str to float
-        Lower limits of the stated errors, by name of the output. A limit is given for an output if all solutions may
-        agree by chance in this output.
     relative_error : float
         Error of every output, divided by the largest value of the output. Only used if there is no coarser solution.
     """
@@ -69,50 +56,28 @@ class Worn:
     height: Function
     image: Function
     pressure: Function
-    energy_volume: float = np.nan
     rougher: tuple[Worn, ...] = ()
-    least_errors: Mapping[str, float] = field(default_factory=dict)
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return an output by name. If the output is a function, return the values at the positions `places`."""
-        if output in FUNCTIONS:
-            return np.asarray(getattr(self, FUNCTIONS[output])(places))
-        return float(getattr(self, output))
+        """Return an attribute by name. If the attribute is a function, return its values at the positions `places`."""
+        found = getattr(self, output)
+        return found(places) if callable(found) else found
 
-    def error(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return the expected absolute error of an output. If the output is a function, return errors at the positions
-        `places`.
+    def error(self, output: str, places: FloatArray) -> FloatArray:
+        """Return the expected absolute error of an attribute, or NaN where the value is not finite.
 
-        The error follows from the differences between this solution and the coarser solutions. Without coarser
-        solutions, the error is `relative_error` times the largest value of the output.
+        The error of a function is the largest error at the positions `places`.
         """
-        if not self.rougher:
-            value = np.asarray(self.value(output, places), dtype=float)
-            largest = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
-            return np.asarray(np.where(np.isfinite(value), self.relative_error * largest, np.nan))
-        if output not in FUNCTIONS:
-            return max(SAFETY * float(self._distance(output, places)), self.least_errors.get(output, 0.0))
-        crowd = self._crowd(float(places[-1]))
-        finite = np.nan_to_num(self._distance(output, crowd), nan=0.0, posinf=0.0)
-        padded = np.pad(finite, REACH, mode="edge")
-        wide = np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1).max(axis=1)
-        return np.asarray(SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide)))
-
-    def _distance(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the difference from the first coarser solution, but at least half the difference from the second."""
-        # two solutions may agree by chance
-        value = self.value(output, places)
-        with np.errstate(invalid="ignore"):
-            gaps = [np.abs(value - one.value(output, places)) / (k + 1) for k, one in enumerate(self.rougher)]
-        return np.asarray(np.max(gaps, axis=0))
-
-    def _crowd(self, last: float) -> FloatArray:
-        """Return positions from 0 to at least `last`, with small spacings near stick border and contact edge."""
-        farthest = max(last, *(one.contact_radius for one in self.rougher))
-        cuts = sorted({0.0, self.stick_border, self.contact_radius, farthest})
-        steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
-        return np.concatenate([low + (high - low) * steps**1.5 for low, high in pairwise(cuts)])
+        value = np.asarray(self.value(output, places))
+        if self.rougher:
+            with np.errstate(invalid="ignore"):
+                # two solutions may agree by chance
+                gaps = [np.abs(value - one.value(output, places)) / (k + 1) for k, one in enumerate(self.rougher)]
+            error = SAFETY * np.max(gaps, initial=0.0, where=np.isfinite(gaps))
+        else:
+            error = self.relative_error * np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
+        return np.where(np.isfinite(value), error, np.nan)
 
 
 class Scar(NamedTuple):

@@ -31,8 +31,3 @@ def test_identities_of_every_power(exponent):
     radius = contact.contact_radius(np.array([0.3 - h, 0.3 + h]), 1.7, exponent)
     slope = np.diff(contact.normal_force(radius, 1.7, exponent, 5.0))[0] / (2 * h)
     assert slope == pytest.approx(2 * 5.0 * a, rel=1e-6)  # the stiffness 2 E* a, by a central difference
-
-
-def test_stick_radius_of_a_sphere():
-    assert contact.stick_radius(0.75, 2.0) == pytest.approx(0.5)
-    assert np.isnan(contact.stick_radius(1.2, 2.0))

