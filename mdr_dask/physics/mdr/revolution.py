@@ -5,11 +5,9 @@ Lengths are divided by the contact radius a0, and heights by the depth d0, so th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -17,19 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.jit import jit, jit_inline, last_until
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
-
-
-class Image(NamedTuple):
-    """Image g0 for compiled code, which is a piecewise cubic, or the power law x^exponent if there are no knots.
-
-    `coefficients`, shape (4, pieces), belong to the powers 3, 2, 1, 0 of the distance from the left knot of each piece.
-    """
-
-    exponent: float
-    knots: FloatArray
-    coefficients: FloatArray
 
 
 @dataclass(frozen=True)
@@ -64,10 +50,6 @@ class PowerProfile:
     def inside(self, level: float) -> float:
         """Return the position where g0 reaches `level`."""
         return float(level ** (1.0 / self.exponent))
-
-    def pieces(self) -> Image:
-        """Return the image for compiled code."""
-        return Image(self.exponent, np.empty(0), np.empty((4, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,47 +93,8 @@ class TableProfile:
         """Return the position where g0 reaches `level`, by bisection."""
         return bisect(lambda x: float(self.image_curve(np.asarray(x))) - level, 0.0, 1.0)
 
-    def pieces(self) -> Image:
-        """Return the image for compiled code."""
-        return Image(np.nan, np.ascontiguousarray(self.image_curve.x), np.ascontiguousarray(self.image_curve.c))
-
 
 Profile = PowerProfile | TableProfile
-
-
-_ABSCISSA, _WEIGHT = gauss(8)
-
-
-@jit_inline
-def image_rise(image: Image, start: float, level: float, gap: float) -> float:
-    """Return g0(start + gap) - g0(start) without cancellation. The argument `level` is g0(start)."""
-    if image.knots.size == 0:
-        n = image.exponent
-        if n == 2.0:
-            return gap * (2.0 * start + gap)
-        if n == 1.0:
-            return gap
-        if gap <= -start:
-            return -level
-        if gap > 0.25 * start:  # for so large a gap, the difference does not suffer from cancellation
-            return math.pow(start + gap, n) - level
-        return level * math.expm1(n * math.log1p(gap / start))
-    if abs(gap) >= 0.02:
-        return _piece(image, start + gap, 0) - level
-    rise = 0.0
-    for k in range(_ABSCISSA.size):
-        rise += _WEIGHT[k] * _piece(image, start + gap * _ABSCISSA[k], 1)
-    return rise * gap
-
-
-@jit
-def _piece(image: Image, place: float, derivative: int) -> float:
-    """Return the image at a position if `derivative` is 0, or the slope of the image if `derivative` is 1."""
-    cell = last_until(image.knots, place, 0, image.coefficients.shape[1])
-    local, k = place - image.knots[cell], image.coefficients
-    if derivative == 0:
-        return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
-    return float((3.0 * k[0, cell] * local + 2.0 * k[1, cell]) * local + k[2, cell])
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:

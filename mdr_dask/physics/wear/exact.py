@@ -15,7 +15,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
-from mdr_dask.physics.mdr.revolution import Profile, bisect
+from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, march, settled
 from mdr_dask.physics.wear.rules import limit, limit_radius
@@ -25,10 +25,10 @@ from mdr_dask.physics.wear.worn import (
     Worn,
     beyond_table,
     check_stick_radius,
+    closed,
     contact_pressure,
     virgin_load,
     worn_by,
-    worn_height,
     worn_image,
     worn_volume,
 )
@@ -251,17 +251,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     def slope(x: FloatArray) -> FloatArray:
         return np.asarray(frozen_slope(x) * (x < border) - profile.image_slope(x))
 
-    virgin = Scar(c, border, change, slope, _breaks(c, border))
-
-    def excess(radius: float) -> float:
-        return -float(worn_height(virgin, np.array([radius]))[0])
-
-    high = min(border + 4.0 * (1.0 - c), profile.largest_radius)
-    while not excess(high) > 0.0:
-        if high >= profile.largest_radius:
-            raise beyond_table(profile, c)
-        high = min(1.5 * high, profile.largest_radius)
-    scar = virgin._replace(radius=bisect(excess, border, high))
+    scar = closed(profile, Scar(c, np.nan, change, slope, _breaks(c, border)))
     force = 2.0 * (virgin_load(profile, c) + eta * load)
     return worn_by(profile, scar, border, scar.radius, depth, force, worn_volume(scar))
 
@@ -330,13 +320,20 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     if constant_force:
         problem = replace(problem, force=problem.normal_force(problem.start().unknowns))
     moments = march(problem, wanted[-1], resolution.step, resolution.step)
-    return {path: _slid_contact(problem, at(problem, moments, path)) for path in wanted}
+    # a position that the edge passes within a time step begins to wear only at the end of this step, in all solutions
+    return {
+        path: replace(contact, least_errors={"contact_radius": resolution.accuracy * contact.contact_radius})
+        for path, contact in ((path, _slid_contact(problem, at(problem, moments, path))) for path in wanted)
+    }
 
 
 def _slid_contact(problem: GrossSlip, moment: Moment) -> Worn:
     """Return the worn contact after one sliding distance. Outside the contact, the image is NaN."""
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated
     image, a = problem.image(unknowns), problem.edge(unknowns)
+
+    # by the wear law, V = int F ds
+    volume = np.pi * a**2 * panels.weights @ worn if problem.force is None else problem.force * moment.time
 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:
         def function(place: FloatArray) -> FloatArray:
@@ -353,7 +350,9 @@ def _slid_contact(problem: GrossSlip, moment: Moment) -> Worn:
         stick_border=0.0,
         depth=float(image[-1]),
         normal_force=problem.normal_force(unknowns),
-        wear_volume=float(np.pi * a**2 * panels.weights @ worn),
+        wear_volume=float(
+            np.pi * a**2 * panels.weights @ worn if problem.force is None else problem.force * moment.time
+        ),
         worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),

@@ -46,7 +46,9 @@ def history(
         _run(profile, blocks, uniform_grid(number, length))
         for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
     )
-    return [replace(one, rougher=tuple(others)) for one, *others in zip(fine, *rough, strict=True)]
+    # the stated errors of both radii are at least half a cell, because two grids may agree by chance
+    least = dict.fromkeys(("contact_radius", "stick_border"), 0.5 * length / cells)
+    return [replace(one, rougher=tuple(others), least_errors=least) for one, *others in zip(fine, *rough, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

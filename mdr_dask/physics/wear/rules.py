@@ -13,24 +13,33 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
-from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_rise
+from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.worn import Scar, Worn, beyond_table, check_stick_radius, worn_by
+from mdr_dask.physics.wear.worn import (
+    EPS,
+    Scar,
+    Worn,
+    check_stick_radius,
+    closed,
+    virgin_load,
+    worn_by,
+    worn_height,
+    worn_volume,
+)
 
 LAYER_GROWTH = 30.0  # ratio of the widths of successive pieces of integration at the stick border
-SCAR = 1e-10  # tolerance, divided by eta, of the integral that vanishes at the radius of the scar
+SCAR = 1e-10  # tolerance of the integral that vanishes at the radius of the scar, relative to its values at the ends
 ERROR = 2e-6  # numerical error of every output, divided by the largest value; not the error of the fast rule
-EPS = float(np.finfo(np.float64).eps)
-_NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One case, with virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), and `rest` = exp(-xi N / a(c))."""
+    """One case of a power law x^exponent: stick radius c, `level` = c^exponent, eta = 1 - `level`, and `rest`."""
 
-    image: Image
+    exponent: float
     c: float
     level: float
     eta: float
@@ -48,10 +57,7 @@ class Quadrature(NamedTuple):
 def limit_radius(profile: Profile, stick_radius: float) -> float:
     """Return a(c), the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10)."""
     check_stick_radius(stick_radius)
-    radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, _quadrature()))
-    if np.isnan(radius):
-        raise beyond_table(profile, stick_radius)
-    return radius
+    return closed(profile, _scar(profile, stick_radius, 0.0)).radius
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:
@@ -64,8 +70,10 @@ def limit(profile: Profile, stick_radius: float) -> Worn:
     >>> print(f"{worn.contact_radius:.4f} {worn.wear_volume:.4f}")
     1.2298 0.7593
     """
-    radius = limit_radius(profile, stick_radius)
-    return _worn(profile, _rule(profile, stick_radius, 0.0), radius, stick_radius)
+    scar = _scar(profile, stick_radius, 0.0)._replace(radius=limit_radius(profile, stick_radius))
+    force = 2.0 * virgin_load(profile, stick_radius)
+    worn = worn_by(profile, scar, stick_radius, stick_radius, 1.0, force, worn_volume(scar))
+    return replace(worn, relative_error=ERROR)
 
 
 def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) -> Worn:
@@ -83,16 +91,53 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
         Factor xi in the exponent xi N / a(c) of the fast rule. In the thesis, the factor 0.8 was fitted by eye. The
         best factor lies between 0.9 and 1.
     """
-    radius = limit_radius(profile, stick_radius)
-    rest = max(math.exp(-xi * cycles / radius), EPS)  # a smaller value would be lost to rounding at the stick border
-    return _worn(profile, _rule(profile, stick_radius, rest), radius, 1.0)
+    largest = limit_radius(profile, stick_radius)
+    rest = max(math.exp(-xi * cycles / largest), EPS)  # a smaller value would be lost to rounding at the stick border
+    scar = _scar(profile, stick_radius, rest)._replace(radius=largest)
+
+    def depth(radius: float) -> float:
+        return float(worn_height(scar, np.array([radius]))[0])
+
+    if depth(largest) < 0.0 < depth(1.0):
+        scar = scar._replace(radius=brentq(depth, 1.0, largest, xtol=EPS))
+    cuts = np.array([stick_radius, *scar.breaks])
+    abscissa, weight = gauss(16)
+    x = cuts[:-1, None] + np.diff(cuts)[:, None] * abscissa
+    depth_left = 1.0 - profile.image(np.array(stick_radius)) - profile.rise(x - stick_radius, stick_radius)
+    load = virgin_load(profile, stick_radius) + float(np.diff(cuts) @ ((depth_left - scar.change(x)) @ weight))
+    return replace(worn_by(profile, scar, stick_radius, 1.0, 1.0, 2.0 * load, worn_volume(scar)), relative_error=ERROR)
+
+
+def _scar(profile: Profile, c: float, rest: float) -> Scar:
+    """Return a scar without its radius by the fast rule, or in the limit if `rest` is 0."""
+    eta = float(profile.rise(np.array(1.0 - c), c))
+
+    def parts(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        start = profile.rise(np.maximum(x - c, 0.0), c) / eta
+        return start, start + (1.0 - start) * rest
+
+    def change(x: FloatArray) -> FloatArray:
+        start, left = parts(x)
+        worn = np.divide(start, left, out=np.ones_like(left), where=(left > 0.0) & (x <= 1.0))
+        return eta * (1.0 - start) * (1.0 - rest) * worn
+
+    def slope(x: FloatArray) -> FloatArray:
+        _, left = parts(x)
+        inside = np.where(left > 0.0, rest / np.maximum(left, 1e-100) ** 2, 0.0)
+        return np.asarray(profile.image_slope(x) * (np.where(x <= 1.0, inside, rest) - 1.0))
+
+    # in a layer at the stick border, the logistic law rises steeply; its width is the distance from c to y = 1/2
+    level = eta * rest / (1.0 + rest)
+    layer = bisect(lambda gap: float(profile.rise(np.array(gap), c)) - level, 0.0, 1.0 - c) if rest > 0.0 else 0.0
+    breaks = (*(min(c + layer * LAYER_GROWTH**k, 1.0) for k in range(3)), 1.0)
+    return Scar(c, np.nan, change, slope, tuple(sorted({place for place in breaks if place > c})))
 
 
 def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> FloatArray:
     """Return contact radius, wear volume and normal force of limiting profiles of power-law bodies, shape (3, ...)."""
     parts = np.broadcast_arrays(exponent, stick_radius)
     cases = np.array([np.ravel(part) for part in parts], dtype=float)
-    return _limits(cases, _NO_TABLE, _quadrature()).reshape((3, *parts[0].shape))
+    return _limits(cases, _quadrature()).reshape((3, *parts[0].shape))
 
 
 def fast_cases(
@@ -104,41 +149,30 @@ def fast_cases(
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.ravel(part) for part in parts], dtype=float)
-    return _fasts(cases, _NO_TABLE, _quadrature()).reshape((3, *parts[0].shape))
+    return _fasts(cases, _quadrature()).reshape((3, *parts[0].shape))
 
 
 def _quadrature() -> Quadrature:
     return Quadrature(*gauss(16), np.empty(5))  # 16 nodes are sufficient for the accuracy `ERROR`
 
 
-def _rule(profile: Profile, c: float, rest: float) -> Rule:
-    eta = float(profile.rise(np.array(1.0 - c), c))
-    return Rule(profile.pieces(), c, float(profile.image(np.array(c))), eta, rest)
-
-
-def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
-    """Return the worn contact that carries load up to the radius `edge`."""
-    quadrature = _quadrature()
-    radius, volume, force = _numbers(rule, radius, quadrature)
-    c, eta, rest = rule.c, rule.eta, rule.rest
-
-    def change(x: FloatArray) -> FloatArray:
-        return _changes(rule, x.ravel()).reshape(x.shape)
-
-    def slope(x: FloatArray) -> FloatArray:
-        start = profile.rise(np.maximum(x - c, 0.0), c) / eta
-        left = start + (1.0 - start) * rest
-        inside = np.where(left > 0.0, rest / np.maximum(left, 1e-100) ** 2, 0.0) - 1.0
-        return np.asarray(profile.image_slope(x) * np.where(x <= 1.0, inside, rest - 1.0))
-
-    scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
-    return replace(worn_by(profile, scar, c, edge, 1.0, force, volume), relative_error=ERROR)
+@jit_inline
+def _rise(rule: Rule, gap: float) -> float:
+    """Return g0(c + gap) - g0(c) without cancellation."""
+    n, c = rule.exponent, rule.c
+    if n == 2.0:
+        return gap * (2.0 * c + gap)
+    if n == 1.0:
+        return gap
+    if gap > 0.25 * c:  # for so large a gap, the difference does not suffer from cancellation
+        return math.pow(c + gap, n) - rule.level
+    return rule.level * math.expm1(n * math.log1p(gap / c))
 
 
 @jit_inline
 def _change(rule: Rule, gap: float) -> float:
     """Return g - g0 at c + gap."""
-    rise = image_rise(rule.image, rule.c, rule.level, gap)
+    rise = _rise(rule, gap)
     if rule.rest == 0.0:
         return rule.eta - rise
     if rule.c + gap > 1.0:
@@ -149,29 +183,10 @@ def _change(rule: Rule, gap: float) -> float:
 
 
 @jit
-def _changes(rule: Rule, places: FloatArray) -> FloatArray:
-    result = np.empty(places.size)
-    for k in range(places.size):
-        result[k] = _change(rule, max(places[k] - rule.c, 0.0))
-    return result
-
-
-@jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
     """Write the ends of the pieces of integration to `cuts`: c, the radius with y = 1/2, two larger radii, and 1."""
-    low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
-    if rule.rest == 0.0:
-        high = 0.0
-    elif rule.image.knots.size == 0:
-        high = rule.c * math.expm1(math.log1p(level / rule.level) / rule.image.exponent)
-    else:
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if image_rise(rule.image, rule.c, rule.level, middle) < level:
-                low = middle
-            else:
-                high = middle
-    cuts[0], cuts[1] = rule.c, min(rule.c + high, 1.0)
+    layer = rule.c * math.expm1(math.log1p(rule.eta * rule.rest / (1.0 + rule.rest) / rule.level) / rule.exponent)
+    cuts[0], cuts[1] = rule.c, min(rule.c + layer, 1.0)
     for piece in range(2, 4):
         cuts[piece] = min(rule.c + LAYER_GROWTH * (cuts[piece - 1] - rule.c), 1.0)
     cuts[4] = 1.0
@@ -219,6 +234,7 @@ def _scar_radius(
     """
     if not high_value < 0.0 < low_value:
         return high
+    tolerance = SCAR * (low_value - high_value)
     radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
     for _ in range(100):
         value, last = _scar_integral(rule, radius, 0, quadrature), radius
@@ -231,21 +247,19 @@ def _scar_radius(
             low_value *= share if replaced > 0 else 1.0
             high, high_value, replaced = radius, value, 1
         radius = (low * high_value - high * low_value) / (high_value - low_value)
-        if abs(value) < SCAR * rule.eta or abs(radius - last) < 2.0 * EPS * radius:
+        if abs(value) < tolerance or abs(radius - last) < 2.0 * EPS * radius:
             break
     return radius
 
 
 @jit
-def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
-    """Return a(c) for a rule with `rest` = 0, or NaN if a(c) exceeds the largest radius."""
+def _limit_radius(rule: Rule, quadrature: Quadrature) -> float:
+    """Return a(c) for a rule with `rest` = 0."""
     _put_cuts(rule, quadrature.cuts)
-    low, high = 1.0, min(1.5, largest)
+    low, high = 1.0, 1.5
     low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)
     while high_value > 0.0:
-        if high == largest:
-            return np.nan
-        low, low_value, high = high, high_value, min(1.5 * high, largest)
+        low, low_value, high = high, high_value, 1.5 * high
         high_value = _scar_integral(rule, high, 0, quadrature)
     return _scar_radius(rule, low, low_value, high, high_value, quadrature)
 
@@ -260,52 +274,38 @@ def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, f
         first, last = _scar_integral(rule, 1.0, 0, quadrature), _scar_integral(rule, limit, 0, quadrature)
         radius = _scar_radius(rule, 1.0, first, limit, last, quadrature)
     volume = 4.0 * _scar_integral(rule, radius, 1, quadrature)
-    load, worn = _sticking_load(rule, abscissa, weight), 0.0
+    load, worn = rule.c * (1.0 - rule.level / (rule.exponent + 1.0)), 0.0
     for piece in range(4 if rule.rest > 0.0 else 0):  # in the limiting profile, the slip zone carries no load
         width = cuts[piece + 1] - cuts[piece]
         for k in range(abscissa.size):
             gap = cuts[piece] - rule.c + width * abscissa[k]
-            unworn = rule.eta - image_rise(rule.image, rule.c, rule.level, gap)
+            unworn = rule.eta - _rise(rule, gap)
             worn += weight[k] * width * (unworn - _change(rule, gap))
     return radius, volume, 2.0 * (load + worn)
 
 
 @jit
-def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> float:
-    """Return int_0^c (1 - g0) dx."""
-    if rule.image.knots.size == 0:
-        return rule.c * (1.0 - rule.level / (rule.image.exponent + 1.0))
-    load = 0.0
-    for k in range(abscissa.size):
-        share = weight[k] * 4.0 * rule.c * abscissa[k] ** 3  # x = c t^4 makes a power law smooth at the axis
-        place = rule.c * abscissa[k] ** 4
-        load += share * (rule.eta - image_rise(rule.image, rule.c, rule.level, place - rule.c))
-    return load
-
-
-@jit
-def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
+def _limits(cases: FloatArray, quadrature: Quadrature) -> FloatArray:
     """Return scar radius, volume and force of limiting profiles. The rows of `cases` are n and c."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
-        rule = _power_rule(no_table, cases[0, k], cases[1, k], 0.0)
-        radius = _limit_radius(rule, np.inf, quadrature)
+        rule = _power_rule(cases[0, k], cases[1, k], 0.0)
+        radius = _limit_radius(rule, quadrature)
         result[0, k], result[1, k], result[2, k] = _numbers(rule, radius, quadrature)
     return result
 
 
 @jit
-def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature) -> FloatArray:
+def _fasts(cases: FloatArray, quadrature: Quadrature) -> FloatArray:
     """Return scar radius, volume and force by the fast rule. The rows of `cases` are n, c, N, xi and a(c)."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
-        rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), EPS))
+        rule = _power_rule(n, c, max(math.exp(-xi * cycles / limit), EPS))
         result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
     return result
 
 
 @jit
-def _power_rule(no_table: Image, exponent: float, c: float, rest: float) -> Rule:
-    image = Image(exponent, no_table.knots, no_table.coefficients)
-    return Rule(image, c, math.pow(c, exponent), -math.expm1(exponent * math.log(c)), rest)
+def _power_rule(exponent: float, c: float, rest: float) -> Rule:
+    return Rule(exponent, c, math.pow(c, exponent), -math.expm1(exponent * math.log(c)), rest)

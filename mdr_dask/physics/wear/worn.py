@@ -7,17 +7,20 @@ sigma0 / (4 U0 k E*). Heights f are measured upwards from the virgin apex. Wear 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.refine import SAFETY
 
+EPS = float(np.finfo(np.float64).eps)
 JUMP_WIDTH = (
     1e-9  # a change of the image within this distance from a border, divided by the radius of the border, is a jump
 )
@@ -43,6 +46,8 @@ class Worn:
     rougher : tuple of Worn
         One or two coarser solutions of the same contact. The errors are estimated from the differences between this
         solution and the coarser solutions.
+    least_errors : mapping of str to float
+        Lower limits of the stated errors, by name of the output, for radii that may agree in all solutions by chance.
     relative_error : float
         Error of every output, divided by the largest value of the output. Only used if there is no coarser solution.
     """
@@ -57,6 +62,7 @@ class Worn:
     image: Function
     pressure: Function
     rougher: tuple[Worn, ...] = ()
+    least_errors: Mapping[str, float] = field(default_factory=dict)
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
@@ -67,14 +73,19 @@ class Worn:
     def error(self, output: str, places: FloatArray) -> FloatArray:
         """Return the expected absolute error of an attribute, or NaN where the value is not finite.
 
-        The error of a function is the largest error at the positions `places`.
+        The error of a function is one number, the largest difference between the solutions along the function.
         """
         value = np.asarray(self.value(output, places))
         if self.rougher:
+            # the difference is largest at the radii of the solutions, or between two positions
+            radii = [radius for one in (self, *self.rougher) for radius in (one.stick_border, one.contact_radius)]
+            points = np.concatenate([places, 0.5 * (places[1:] + places[:-1]), radii])
+            found = self.value(output, points)
             with np.errstate(invalid="ignore"):
-                # two solutions may agree by chance
-                gaps = [np.abs(value - one.value(output, places)) / (k + 1) for k, one in enumerate(self.rougher)]
+                # the first coarser solution may agree by chance, so half the difference to the second counts as well
+                gaps = [np.abs(found - one.value(output, points)) / (k + 1) for k, one in enumerate(self.rougher)]
             error = SAFETY * np.max(gaps, initial=0.0, where=np.isfinite(gaps))
+            error = max(error, self.least_errors.get(output, 0.0))
         else:
             error = self.relative_error * np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
         return np.where(np.isfinite(value), error, np.nan)
@@ -117,6 +128,20 @@ def worn_volume(scar: Scar) -> float:
         return np.asarray(scar.change(x) * (a - x) * (a + x))
 
     return float(2.0 * np.pi * worn_height(scar._replace(change=weighted), np.array([a]))[0])
+
+
+def closed(profile: Profile, scar: Scar) -> Scar:
+    """Return the scar with the radius a > 1 at which the worn profile meets the virgin profile."""
+
+    def depth(radius: float) -> float:
+        return float(worn_height(scar, np.array([radius]))[0])
+
+    low, high = 1.0, min(1.5, profile.largest_radius)
+    while depth(high) > 0.0:
+        if high >= profile.largest_radius:
+            raise beyond_table(profile, scar.border)
+        low, high = high, min(1.5 * high, profile.largest_radius)
+    return scar._replace(radius=brentq(depth, low, high, xtol=EPS))
 
 
 def worn_image(profile: Profile, scar: Scar) -> Function:
