@@ -350,9 +350,7 @@ def _slid_contact(problem: GrossSlip, moment: Moment) -> Worn:
         stick_border=0.0,
         depth=float(image[-1]),
         normal_force=problem.normal_force(unknowns),
-        wear_volume=float(
-            np.pi * a**2 * panels.weights @ worn if problem.force is None else problem.force * moment.time
-        ),
+        wear_volume=float(volume),
         worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
