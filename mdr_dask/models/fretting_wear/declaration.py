@@ -208,42 +208,43 @@ class FrettingWear(Parameters):
         return self.stick_radius is not None or (self.path is not None and self.contact_modulus is None)
 
     @model_validator(mode="after")
-    def _one_kind(self) -> FrettingWear:
-        given = [name for name in (*self._needed(), "normal_force", "depth") if getattr(self, name) is not None]
+    def _is_consistent(self) -> FrettingWear:
         size = _SIZES.get(self.indenter.shape)
-        if self.dimensionless and size is not None and getattr(self.indenter, size) is not None:
-            given.append(f"indenter.{size}")
-        if self.stick_radius is not None and given:
+        values = {
+            name: getattr(self, name) for name in ("contact_modulus", *_OSCILLATION, *_OF_RATE, "normal_force", "depth")
+        }
+        if size is not None:
+            values = {f"indenter.{size}": getattr(self.indenter, size)} | values
+        given = [name for name, value in values.items() if value is not None]
+        optional = {"normal_force", "depth"}
+        optional |= {*_OSCILLATION} if self.path is not None else set()
+        optional |= {*_OF_RATE} if self.wear_rule == "limit" else set()
+        missing = [name for name in values if name not in given and name not in optional]
+        oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
+        idle = [name for name in oscillating if self.path is not None and getattr(self, name)]
+        if idle:
+            raise ValueError(f"path means sliding in one direction: leave out {', '.join(idle)} (oscillation)")
+        if self.dimensionless and given:
+            kind = "stick_radius" if self.path is None else "path without contact_modulus"
             raise ValueError(
-                f"expected stick_radius or quantities with units, got stick_radius and {', '.join(given)}; leave "
-                "out stick_radius or all the others"
+                f"expected {kind} or quantities with units, got {kind} and {', '.join(given)}; leave out "
+                f"{'stick_radius or all the others' if self.path is None else 'them, or give contact_modulus'}"
             )
-        if not self.dimensionless:
-            self._check_dimensional()
+        if not self.dimensionless and missing:
+            raise ValueError(f"give stick_radius, or for a dimensional campaign also {', '.join(missing)}")
+        if not self.dimensionless and (self.normal_force is None) == (self.depth is None):
+            raise ValueError(
+                f"give either normal_force or depth, got normal_force {self.normal_force!r} and depth {self.depth!r}"
+            )
         if isinstance(self.indenter, Table) and self.depth is None:
             raise ValueError(
                 "a table of a profile needs a dimensional campaign: give depth, instead of normal_force or stick_radius"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _sliding(self) -> FrettingWear:
-        if self.path is None:
-            return self
-        oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
-        given = [name for name in oscillating if getattr(self, name)]
-        if given:
-            raise ValueError(f"path means sliding in one direction: leave out {', '.join(given)} (oscillation)")
-        if self.wear_rule != "exact":
-            raise ValueError(f"expected wear_rule exact for sliding along a path, got {self.wear_rule!r}")
-        return self
-
-    @model_validator(mode="after")
-    def _history(self) -> FrettingWear:
         if self.wear_rule == "fast" and self.hold == "force":
             raise ValueError(FAST_AT_DEPTH)
-        if self.history and self.wear_rule != "exact":
-            raise ValueError(f"expected wear_rule: exact, because a history is given, got {self.wear_rule!r}")
+        if self.wear_rule != "exact" and (self.history or self.path is not None):
+            name = "history" if self.history else "path"
+            raise ValueError(f"expected wear_rule: exact, because a {name} is given, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
                 raise ValueError(f"{name} replaces {other}: leave out one or the other")
@@ -262,23 +263,6 @@ class FrettingWear(Parameters):
             "and by up to a third of d0 at small stick radii; the stored errors do not include this difference "
             "(docs/wear.md)",
         )
-
-    def _check_dimensional(self) -> None:
-        idle = _OF_RATE if self.wear_rule == "limit" else ()
-        missing = [name for name in self._needed() if getattr(self, name) is None and name not in idle]
-        size = _SIZES.get(self.indenter.shape)
-        if size is not None and getattr(self.indenter, size) is None:
-            missing.insert(0, f"indenter.{size}")
-        if missing:
-            raise ValueError(f"give stick_radius, or for a dimensional campaign also {', '.join(missing)}")
-        if (self.normal_force is None) == (self.depth is None):
-            raise ValueError(
-                f"give either normal_force or depth, got normal_force {self.normal_force!r} and depth {self.depth!r}"
-            )
-
-    def _needed(self) -> tuple[str, ...]:
-        oscillating = _OSCILLATION if self.path is None else ()
-        return ("contact_modulus", *oscillating, *_OF_RATE)
 
 
 def _output(name: str, unit: str, meaning: str, dims: tuple[str, ...] = (), *, default: bool = False) -> Output:

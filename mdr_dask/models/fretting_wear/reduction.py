@@ -172,7 +172,7 @@ def table_profile(indenter: Indenter, depth: float) -> TableProfile:
     return _pressed_table(indenter.file, depth)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)  # cases of a block share a solution only if they share a profile
 def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_table
 

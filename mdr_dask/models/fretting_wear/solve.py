@@ -49,25 +49,18 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """All data of a case except the number of cycles N and the factor xi of the fast rule.
+    """The body before wear, and all data of a case except the number of cycles N and the factor xi of the fast rule.
 
     Several cases can have the same task. `extent` is the last radius of the profiles, divided by a0.
     """
 
-    table: Table | None
-    depth: float
-    exponent: float
+    profile: Profile
     level: float
     rule: str
     hold: str
     cells: int
-    blocks: tuple[tuple[float, float, float], ...]
+    blocks: tuple[LoadBlock, ...]
     extent: float
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of the body before wear."""
-        return PowerProfile(self.exponent) if self.table is None else table_profile(self.table, self.depth)
 
 
 def compute(block: Block[FrettingWear]) -> Result:
@@ -296,21 +289,21 @@ def _tasks(
 
 
 def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place: tuple[int, int]) -> Task:
-    dimensional = not parameters.dimensionless
+    n, level, height = (float(part[place]) for part in (numbers.exponent, numbers.level, numbers.height))
+    profile = table_profile(indenter, height) if isinstance(indenter, Table) else PowerProfile(n)
+    is_force = parameters.hold == "force"
+    held = 2.0 * virgin_load(profile, 1.0) if is_force and parameters.history else 1.0
     blocks = tuple(
-        (
-            step.cycles * float(numbers.advance[place]) * (step.amplitude_factor if dimensional else 1.0),
-            step.amplitude_factor,
-            step.load_factor,
+        LoadBlock(
+            step.cycles * float(numbers.advance[place]) * (1.0 if parameters.dimensionless else step.amplitude_factor),
+            (1.0 - level) * step.amplitude_factor,
+            **{"force" if is_force else "depth": held * step.load_factor},
         )
         for step in parameters.history
     )
-    table = indenter if isinstance(indenter, Table) else None
     return Task(
-        table,
-        1.0 if table is None else float(numbers.height[place]),
-        float(numbers.exponent[place]) if table is None else 0.0,
-        float(numbers.level[place]),
+        profile,
+        level,
         "sliding" if parameters.path is not None else parameters.wear_rule,
         parameters.hold,
         parameters.cells if blocks else 0,
@@ -354,31 +347,16 @@ def _solved(
 
     There is one contact for each block of a load history, or a single contact without a history.
     """
-    profile, force = task.profile, task.hold == "force"
+    profile, is_force = task.profile, task.hold == "force"
     if task.blocks:
-        return [_loaded(task, profile, errors=errors)] * len(wanted)
+        deepest = 2.0 if is_force else max(block.depth or 1.0 for block in task.blocks)
+        reach = min(1.7 * deepest, profile.largest_radius)
+        return [history(profile, task.blocks, cells=task.cells, reach=reach, errors=errors)] * len(wanted)
     stick = profile.inside(task.level) if task.level > 0.0 else 0.0
     if task.rule == "fast":
-        if force:
+        if is_force:
             raise ValueError(FAST_AT_DEPTH)
         return [(rules.fast(profile, stick, cycles, xi),) for cycles, xi in wanted]
     amounts = [np.inf if task.rule == "limit" else amount for amount, _ in wanted]
-    contacts = exact(profile, stick, amounts, accuracy, constant_force=force, errors=errors)
+    contacts = exact(profile, stick, amounts, accuracy, constant_force=is_force, errors=errors)
     return [(contact,) for contact in contacts]
-
-
-def _loaded(task: Task, profile: Profile, *, errors: bool) -> list[Worn]:
-    """Return the contact after each block of a load history."""
-    first = 2.0 * virgin_load(profile, 1.0)
-    blocks = [
-        LoadBlock(
-            path,
-            (1.0 - task.level) * amplitude,
-            depth=factor if task.hold == "depth" else None,
-            force=first * factor if task.hold == "force" else None,
-        )
-        for path, amplitude, factor in task.blocks
-    ]
-    deepest = max(block.depth or 1.0 for block in blocks) if task.hold == "depth" else 2.0
-    reach = min(1.7 * deepest, profile.largest_radius)
-    return history(profile, blocks, cells=task.cells, reach=reach, errors=errors)
