@@ -77,9 +77,9 @@ class Worn:
         """
         value = np.asarray(self.value(output, places))
         if self.rougher:
-            # the difference is largest at the radii of the solutions, or between two positions
-            radii = [radius for one in (self, *self.rougher) for radius in (one.stick_border, one.contact_radius)]
-            points = np.concatenate([places, 0.5 * (places[1:] + places[:-1]), radii])
+            # the difference is largest at the stick borders, or between two positions
+            borders = [one.stick_border for one in (self, *self.rougher)]
+            points = np.concatenate([places, 0.5 * (places[1:] + places[:-1]), borders])
             found = self.value(output, points)
             with np.errstate(invalid="ignore"):
                 # the first coarser solution may agree by chance, so half the difference to the second counts as well
