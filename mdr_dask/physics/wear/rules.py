@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
@@ -27,13 +26,15 @@ from mdr_dask.physics.wear.worn import (
     closed,
     virgin_load,
     worn_by,
-    worn_height,
     worn_volume,
 )
 
 LAYER_GROWTH = 30.0  # ratio of the widths of successive pieces of integration at the stick border
 SCAR = 1e-10  # tolerance of the integral that vanishes at the radius of the scar, relative to its values at the ends
 ERROR = 2e-6  # numerical error of every output, divided by the largest value; not the error of the fast rule
+
+
+_ABSCISSA, _WEIGHT = gauss(16)  # 16 nodes are sufficient for the accuracy `ERROR`
 
 
 class Rule(NamedTuple):
@@ -44,14 +45,6 @@ class Rule(NamedTuple):
     level: float
     eta: float
     rest: float
-
-
-class Quadrature(NamedTuple):
-    """Gauss nodes on [0, 1], and the ends of the pieces of integration: c, three radii between c and 1, and 1."""
-
-    abscissa: FloatArray
-    weight: FloatArray
-    cuts: FloatArray
 
 
 def limit_radius(profile: Profile, stick_radius: float) -> float:
@@ -93,18 +86,11 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
     """
     largest = limit_radius(profile, stick_radius)
     rest = max(math.exp(-xi * cycles / largest), EPS)  # a smaller value would be lost to rounding at the stick border
-    scar = _scar(profile, stick_radius, rest)._replace(radius=largest)
-
-    def depth(radius: float) -> float:
-        return float(worn_height(scar, np.array([radius]))[0])
-
-    if depth(largest) < 0.0 < depth(1.0):
-        scar = scar._replace(radius=brentq(depth, 1.0, largest, xtol=EPS))
+    scar = closed(profile, _scar(profile, stick_radius, rest), largest)
     cuts = np.array([stick_radius, *scar.breaks])
-    abscissa, weight = gauss(16)
-    x = cuts[:-1, None] + np.diff(cuts)[:, None] * abscissa
+    x = cuts[:-1, None] + np.diff(cuts)[:, None] * _ABSCISSA
     depth_left = 1.0 - profile.image(np.array(stick_radius)) - profile.rise(x - stick_radius, stick_radius)
-    load = virgin_load(profile, stick_radius) + float(np.diff(cuts) @ ((depth_left - scar.change(x)) @ weight))
+    load = virgin_load(profile, stick_radius) + float(np.diff(cuts) @ ((depth_left - scar.change(x)) @ _WEIGHT))
     return replace(worn_by(profile, scar, stick_radius, 1.0, 1.0, 2.0 * load, worn_volume(scar)), relative_error=ERROR)
 
 
@@ -137,7 +123,7 @@ def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> FloatArray:
     """Return contact radius, wear volume and normal force of limiting profiles of power-law bodies, shape (3, ...)."""
     parts = np.broadcast_arrays(exponent, stick_radius)
     cases = np.array([np.ravel(part) for part in parts], dtype=float)
-    return _limits(cases, _quadrature()).reshape((3, *parts[0].shape))
+    return _limits(cases).reshape((3, *parts[0].shape))
 
 
 def fast_cases(
@@ -149,11 +135,7 @@ def fast_cases(
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.ravel(part) for part in parts], dtype=float)
-    return _fasts(cases, _quadrature()).reshape((3, *parts[0].shape))
-
-
-def _quadrature() -> Quadrature:
-    return Quadrature(*gauss(16), np.empty(5))  # 16 nodes are sufficient for the accuracy `ERROR`
+    return _fasts(cases).reshape((3, *parts[0].shape))
 
 
 @jit_inline
@@ -183,19 +165,20 @@ def _change(rule: Rule, gap: float) -> float:
 
 
 @jit
-def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
-    """Write the ends of the pieces of integration to `cuts`: c, the radius with y = 1/2, two larger radii, and 1."""
+def _cuts(rule: Rule) -> FloatArray:
+    """Return the ends of the pieces of integration: c, the radius with y = 1/2, two larger radii, and 1."""
+    cuts = np.empty(5)
     layer = rule.c * math.expm1(math.log1p(rule.eta * rule.rest / (1.0 + rule.rest) / rule.level) / rule.exponent)
     cuts[0], cuts[1] = rule.c, min(rule.c + layer, 1.0)
     for piece in range(2, 4):
         cuts[piece] = min(rule.c + LAYER_GROWTH * (cuts[piece - 1] - rule.c), 1.0)
     cuts[4] = 1.0
+    return cuts
 
 
 @jit
-def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadrature) -> float:
+def _scar_integral(rule: Rule, radius: float, moment: int, cuts: FloatArray) -> float:
     """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx for R = `radius`, piece by piece between the cuts."""
-    abscissa, weight, cuts = quadrature
     total, end = 0.0, _angle(cuts[0], radius)
     for piece in range(cuts.size):
         last = piece + 1 == cuts.size or cuts[piece + 1] >= radius
@@ -203,9 +186,9 @@ def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadratur
             continue
         begin = 0.0 if last else _angle(cuts[piece + 1], radius)
         part = 0.0
-        for k in range(abscissa.size):
-            angle = begin + (end - begin) * abscissa[k]
-            term = _change(rule, max(radius * math.cos(angle) - rule.c, 0.0)) * weight[k]
+        for k in range(_ABSCISSA.size):
+            angle = begin + (end - begin) * _ABSCISSA[k]
+            term = _change(rule, max(radius * math.cos(angle) - rule.c, 0.0)) * _WEIGHT[k]
             if moment == 1:
                 term *= (radius * math.sin(angle)) ** 2
             part += term
@@ -223,21 +206,20 @@ def _angle(x: float, radius: float) -> float:
 
 
 @jit
-def _scar_radius(
-    rule: Rule, low: float, low_value: float, high: float, high_value: float, quadrature: Quadrature
-) -> float:
-    """Return a radius between `low` and `high` at which `_scar_integral` vanishes, or `high` if there is no such
-    radius.
+def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_value: float, cuts: FloatArray) -> float:
+    """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `low` if nothing is worn.
 
     `low_value` and `high_value` are the values of the integral at `low` and `high`. The root is found by the method of
     false position with the improvement by Anderson and Björck.
     """
-    if not high_value < 0.0 < low_value:
+    if not low_value > 0.0:
+        return low
+    if not high_value < 0.0:
         return high
     tolerance = SCAR * (low_value - high_value)
     radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
     for _ in range(100):
-        value, last = _scar_integral(rule, radius, 0, quadrature), radius
+        value, last = _scar_integral(rule, radius, 0, cuts), radius
         share = 1.0 - value / (low_value if value > 0.0 else high_value)
         share = share if share > 0.0 else 0.5
         if value > 0.0:
@@ -253,56 +235,55 @@ def _scar_radius(
 
 
 @jit
-def _limit_radius(rule: Rule, quadrature: Quadrature) -> float:
+def _limit_radius(rule: Rule) -> float:
     """Return a(c) for a rule with `rest` = 0."""
-    _put_cuts(rule, quadrature.cuts)
+    cuts = _cuts(rule)
     low, high = 1.0, 1.5
-    low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)
+    low_value, high_value = _scar_integral(rule, low, 0, cuts), _scar_integral(rule, high, 0, cuts)
     while high_value > 0.0:
         low, low_value, high = high, high_value, 1.5 * high
-        high_value = _scar_integral(rule, high, 0, quadrature)
-    return _scar_radius(rule, low, low_value, high, high_value, quadrature)
+        high_value = _scar_integral(rule, high, 0, cuts)
+    return _scar_radius(rule, low, low_value, high, high_value, cuts)
 
 
 @jit
-def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force. Write the ends of the pieces of integration to `quadrature`."""
-    abscissa, weight, cuts = quadrature
-    _put_cuts(rule, cuts)
+def _numbers(rule: Rule, limit: float) -> tuple[float, float, float]:
+    """Return scar radius, volume and normal force."""
+    cuts = _cuts(rule)
     radius = limit
     if rule.rest > 0.0:
-        first, last = _scar_integral(rule, 1.0, 0, quadrature), _scar_integral(rule, limit, 0, quadrature)
-        radius = _scar_radius(rule, 1.0, first, limit, last, quadrature)
-    volume = 4.0 * _scar_integral(rule, radius, 1, quadrature)
+        first, last = _scar_integral(rule, 1.0, 0, cuts), _scar_integral(rule, limit, 0, cuts)
+        radius = _scar_radius(rule, 1.0, first, limit, last, cuts)
+    volume = 4.0 * _scar_integral(rule, radius, 1, cuts)
     load, worn = rule.c * (1.0 - rule.level / (rule.exponent + 1.0)), 0.0
     for piece in range(4 if rule.rest > 0.0 else 0):  # in the limiting profile, the slip zone carries no load
         width = cuts[piece + 1] - cuts[piece]
-        for k in range(abscissa.size):
-            gap = cuts[piece] - rule.c + width * abscissa[k]
+        for k in range(_ABSCISSA.size):
+            gap = cuts[piece] - rule.c + width * _ABSCISSA[k]
             unworn = rule.eta - _rise(rule, gap)
-            worn += weight[k] * width * (unworn - _change(rule, gap))
+            worn += _WEIGHT[k] * width * (unworn - _change(rule, gap))
     return radius, volume, 2.0 * (load + worn)
 
 
 @jit
-def _limits(cases: FloatArray, quadrature: Quadrature) -> FloatArray:
+def _limits(cases: FloatArray) -> FloatArray:
     """Return scar radius, volume and force of limiting profiles. The rows of `cases` are n and c."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         rule = _power_rule(cases[0, k], cases[1, k], 0.0)
-        radius = _limit_radius(rule, quadrature)
-        result[0, k], result[1, k], result[2, k] = _numbers(rule, radius, quadrature)
+        radius = _limit_radius(rule)
+        result[0, k], result[1, k], result[2, k] = _numbers(rule, radius)
     return result
 
 
 @jit
-def _fasts(cases: FloatArray, quadrature: Quadrature) -> FloatArray:
+def _fasts(cases: FloatArray) -> FloatArray:
     """Return scar radius, volume and force by the fast rule. The rows of `cases` are n, c, N, xi and a(c)."""
     result = np.empty((3, cases.shape[1]))
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
         rule = _power_rule(n, c, max(math.exp(-xi * cycles / limit), EPS))
-        result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
+        result[0, k], result[1, k], result[2, k] = _numbers(rule, limit)
     return result
 
 

@@ -130,13 +130,18 @@ def worn_volume(scar: Scar) -> float:
     return float(2.0 * np.pi * worn_height(scar._replace(change=weighted), np.array([a]))[0])
 
 
-def closed(profile: Profile, scar: Scar) -> Scar:
-    """Return the scar with the radius a > 1 at which the worn profile meets the virgin profile."""
+def closed(profile: Profile, scar: Scar, high: float = 1.5) -> Scar:
+    """Return the scar with the radius at which the worn profile meets the virgin profile, or 1 if nothing is worn.
+
+    `high` is a first estimate of an upper bound.
+    """
 
     def depth(radius: float) -> float:
         return float(worn_height(scar, np.array([radius]))[0])
 
-    low, high = 1.0, min(1.5, profile.largest_radius)
+    low, high = 1.0, min(high, profile.largest_radius)
+    if not depth(low) > 0.0:
+        return scar._replace(radius=low)
     while depth(high) > 0.0:
         if high >= profile.largest_radius:
             raise beyond_table(profile, scar.border)
