@@ -103,6 +103,16 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
     for case, position in np.argwhere(~known):
         text = "a number of the case is too large or too small for double precision"
         messages.setdefault((int(case), int(position)), f"{text}; check the units")
+    if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
+        return numbers, messages
+    for case, position in np.argwhere(~(numbers.level > 0.0)):
+        times = 1.0 - numbers.level[case, position]
+        messages.setdefault(
+            (int(case), int(position)),
+            f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times:.9g} times that; "
+            "lower amplitude, raise friction, depth or normal_force, or give path (sliding in one direction) "
+            "or history (blocks of load) instead of cycles",
+        )
     return numbers, messages
 
 
@@ -180,32 +190,13 @@ def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     return from_table(table["radius"], table["height"], depth)
 
 
-def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:
-    """Add a message for every case of gross slip.
-
-    Gross slip is allowed only in load histories and in sliding wear.
-    """
-    if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
-        return
-    for case, realisation in np.argwhere(~(numbers.level > 0.0)):
-        times = 1.0 - numbers.level[case, realisation]
-        messages.setdefault(
-            (int(case), int(realisation)),
-            f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times:.9g} times that; "
-            "lower amplitude, raise friction, depth or normal_force, or give path (sliding in one direction) "
-            "or history (blocks of load) instead of cycles",
-        )
-
-
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
     """Return a note if cases of a study will fail. Random scatter is ignored here."""
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)
         block = Block(parameters.model_copy(update=scatter), {}, 1, (0,), 0, ())
-        numbers, messages = reduce_block(block)
-        refuse_gross_slip(block, numbers, messages)
-        texts += messages.values()
+        texts += reduce_block(block)[1].values()
     if not texts:
         return ()
     return (f"{len(texts)} of the {len(sets)} tried parameter sets will fail: {texts[0]}",)

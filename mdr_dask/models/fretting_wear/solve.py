@@ -20,7 +20,6 @@ from mdr_dask.models.fretting_wear.reduction import (
     has_tables,
     indenters,
     reduce_block,
-    refuse_gross_slip,
     table_profile,
 )
 from mdr_dask.models.parts.accuracy import missed_accuracy
@@ -109,7 +108,6 @@ def operations(block: Block[FrettingWear]) -> float:
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
     """Return the dimensionless numbers of a block, messages about invalid cases, and the status of every case."""
     numbers, messages = reduce_block(block)
-    refuse_gross_slip(block, numbers, messages)
     status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
     for position in messages:
         status[position] = Status.FAILED
