@@ -92,7 +92,7 @@ def test_stated_errors_cover_the_distance_from_a_finer_solution(worn):
     for contact, fine in zip(rough, contacts[1:4], strict=True):
         error = contact.error("height", EVERYWHERE)
         assert np.all(np.abs(contact.height(EVERYWHERE) - fine.height(EVERYWHERE)) <= error)
-        assert np.max(error) < 2e-2
+        assert np.max(error) < 3e-2
 
 
 @pytest.mark.parametrize(
