@@ -68,7 +68,7 @@ class Worn:
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
         """Return an attribute by name. If the attribute is a function, return its values at the positions `places`."""
         found = getattr(self, output)
-        return found(places) if callable(found) else found
+        return np.asarray(found(places)) if callable(found) else float(found)
 
     def error(self, output: str, places: FloatArray) -> FloatArray:
         """Return the expected absolute error of an attribute, or NaN where the value is not finite.
@@ -84,10 +84,10 @@ class Worn:
             with np.errstate(invalid="ignore"):
                 # the first coarser solution may agree by chance, so half the difference to the second counts as well
                 gaps = [np.abs(found - one.value(output, points)) / (k + 1) for k, one in enumerate(self.rougher)]
-            error = SAFETY * np.max(gaps, initial=0.0, where=np.isfinite(gaps))
-            error = max(error, self.least_errors.get(output, 0.0))
+            largest = float(np.max(gaps, initial=0.0, where=np.isfinite(gaps)))
+            error = max(SAFETY * largest, self.least_errors.get(output, 0.0))
         else:
-            error = self.relative_error * np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
+            error = self.relative_error * float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value)))
         return np.where(np.isfinite(value), error, np.nan)
 
 
