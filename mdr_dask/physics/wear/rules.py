@@ -49,7 +49,6 @@ class Rule(NamedTuple):
 
 def limit_radius(profile: Profile, stick_radius: float) -> float:
     """Return a(c), the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10)."""
-    check_stick_radius(stick_radius)
     return closed(profile, _scar(profile, stick_radius, 0.0)).radius
 
 
@@ -63,7 +62,7 @@ def limit(profile: Profile, stick_radius: float) -> Worn:
     >>> print(f"{worn.contact_radius:.4f} {worn.wear_volume:.4f}")
     1.2298 0.7593
     """
-    scar = _scar(profile, stick_radius, 0.0)._replace(radius=limit_radius(profile, stick_radius))
+    scar = closed(profile, _scar(profile, stick_radius, 0.0))
     force = 2.0 * virgin_load(profile, stick_radius)
     worn = worn_by(profile, scar, stick_radius, stick_radius, 1.0, force, worn_volume(scar))
     return replace(worn, relative_error=ERROR)
@@ -96,6 +95,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
 
 def _scar(profile: Profile, c: float, rest: float) -> Scar:
     """Return a scar without its radius by the fast rule, or in the limit if `rest` is 0."""
+    check_stick_radius(c)
     eta = float(profile.rise(np.array(1.0 - c), c))
 
     def parts(x: FloatArray) -> tuple[FloatArray, FloatArray]:
