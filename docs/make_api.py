@@ -41,7 +41,7 @@ PUBLIC: dict[str, dict[str, str]] = {
         "mdr_dask.physics.lubrication.line_contact": "line_contact solve_film",
         "mdr_dask.physics.lubrication.film_formulas": "hertz_line dimensionless_groups moes_parameters",
     },
-    "Oils": {"mdr_dask.physics.lubrication.oil": "Oil walther_constants pressure_viscosity log_viscosity"},
+    "Oils": {"mdr_dask.physics.lubrication.oil": "Oil walther_constants pressure_viscosity"},
     "Superposition": {"mdr_dask.physics.superposition.master_curve": "superpose Superposition rereference"},
 }
 

@@ -83,14 +83,13 @@ PERIMETER, FINER = 2 * np.pi * 0.05, 8
 
 
 def rollers(random: np.random.Generator) -> tuple[declaration.MixedLubrication, Truth] | None:
-    """Draw rollers with a layer and an edge rule, and sometimes with creep; the truth is on 1.6 million points."""
+    """Draw rollers with a layer, and sometimes with creep; the truth is on 1.6 million points."""
     case = declaration.MixedLubrication(
         normal_force=random.uniform(200, 1200),
         rotation_speed=power(random, -1, 1),
         temperature=random.uniform(315, 370),
         rms_roughness=2e-7,
         layer_thickness=power(random, -9, -7.5),
-        edge_rule=random.choice(breakthrough.EDGE_RULES),
         slide_roll_ratio=random.choice([0.0, 0.0, 0.0, 0.0, 0.03]),
         points=50_000,
         shortest_wavelength=2.5 * 8 ** random.uniform() * PERIMETER / 50_000,

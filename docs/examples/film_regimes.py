@@ -11,14 +11,20 @@ import xarray as xr
 
 from mdr_dask import store as stores
 from mdr_dask.models.ehl_line import groups
-from mdr_dask.physics.lubrication.film_formulas import REGIMES, moes_parameters, regime
+from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
+
+REGIMES = ("rigid isoviscous", "rigid piezoviscous", "elastic isoviscous", "elastic piezoviscous")
 
 
 def main(store: str, target: str = "film_regimes.png") -> None:
     """Draw the figure of a store into a file."""
     figure, axes = plt.subplots(layout="constrained")
     M, L = np.geomspace(0.1, 1e3, 300), np.geomspace(0.1, 100, 300)
-    field = regime(M, 0.5, L[:, None])  # with 2 U = 1, M is W and L is G
+    films = limiting_films(M, 0.5, L[:, None])  # with 2 U = 1, M is W and L is G
+    # elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner
+    isoviscous, piezoviscous = np.maximum(films[0], films[2]), np.minimum(films[1], films[3])
+    film = np.maximum(isoviscous, piezoviscous)
+    field = np.argmax(films == film, axis=0)
     axes.pcolormesh(M, L, field, cmap="Pastel1", vmin=0, vmax=8, shading="nearest", rasterized=True)
     for k, name in enumerate(REGIMES):
         rows, columns = np.nonzero(field == k)

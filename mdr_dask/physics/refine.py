@@ -91,11 +91,11 @@ def refine(
     The accuracy of an output is relative to the largest absolute value of the output, or to the entry of the output in
     `floors` if this entry is larger. If `accuracy` is infinite, the result on the second level is accepted. `order` is
     the order of convergence of the dominant part of the error. Only the first `requested` outputs must meet the
-    accuracy, or all outputs if `requested` is None. Outputs that are not requested have infinite errors.
+    accuracy, or all outputs if `requested` is None.
 
-    If `shared` is True, the largest relative change among the requested outputs of a case is used for all outputs of
-    this case, because a single output may have the same value on two grids by chance. Choose `shared` = False for
-    outputs that converge at different rates.
+    If `shared` is True, the largest relative change among the requested outputs of a case is used for all requested
+    outputs of this case, because a single output may have the same value on two grids by chance. Outputs that are not
+    requested then have infinite errors. Choose `shared` = False for outputs that converge at different rates.
     """
     reduction = 2.0**order
     left = np.arange(cases)
@@ -127,7 +127,7 @@ def refine(
             errors[:, kept] = np.where(solved, relative * _sizes(fine.values, floor), np.inf)[:, better]
         met[left] = solved & np.all(relative[:requested] <= accuracy, axis=0)
         coarse, before = fine, change
-    if requested is not None:
+    if requested is not None and shared:
         errors[requested:] = np.inf
     for value in values:
         value[outcome != Outcome.CONVERGED] = np.nan

@@ -136,14 +136,10 @@ ROWS = {
     ),
 }
 
-#: Outputs without a value: friction in the steady state if the last state is not steady, and the error of a pressure
-#: spike that is narrower than a cell (docs/ehl.md).
+#: Outputs without a value: friction in the steady state if the last state is not steady.
 NO_VALUE = {
     "steps": {"friction_coefficient_after", "friction_coefficient_after_error"},
     "oscillation": {"friction_coefficient_after", "friction_coefficient_after_error"},
-    "film": {"spike_pressure_error"},
-    "film, compressible": {"spike_pressure_error"},
-    "film, starved, Eyring": {"spike_pressure_error"},
 }
 
 

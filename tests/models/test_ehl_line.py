@@ -58,12 +58,11 @@ def test_units_change_nothing() -> None:
 
 
 def test_profiles_lie_on_the_positions() -> None:
-    result = compute(block(("film", "pressure", "minimum_film", "minimum_position", "spike_position")))
+    result = compute(block(("film", "pressure", "minimum_film")))
     position = coordinates(EhlLineParameters(**CHECKED))["position"].values
     film, pressure = result.values["film"][0, 0], result.values["pressure"][0, 0]
     assert film.shape == pressure.shape == position.shape == (241,)
     assert film.min() == pytest.approx(result.values["minimum_film"][0, 0], rel=5e-3)  # spacing 0.025
-    assert position[np.argmin(film)] == pytest.approx(result.values["minimum_position"][0, 0], abs=0.025)
     p0 = 2 * STEEL * np.sqrt(2.0452e-5 / (2 * np.pi))
     half_width = 0.02 * np.sqrt(8 * 2.0452e-5 / np.pi)
     load = np.trapezoid(pressure, position) * half_width
@@ -92,7 +91,7 @@ def test_cases_share_what_is_the_same() -> None:
 
 def test_errors_are_absolute_and_in_the_unit_of_their_output() -> None:
     """Errors of films are converted from h/R to m. Errors of a profile contain the difference to a finer solution."""
-    names = ("central_film", "minimum_film", "central_film_thickness", "film", "pressure", "rolling_coefficient")
+    names = ("central_film", "minimum_film", "central_film_thickness", "film", "pressure", "spike_position")
     asked = block(names, **DIMENSIONAL)
     here = compute(asked).values
     np.testing.assert_allclose(here["central_film_thickness_error"], 0.02 * here["central_film_error"], rtol=1e-14)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
@@ -18,6 +16,7 @@ from mdr_dask.physics.lubrication.film_formulas import (
     square_of_half_width,
     thick_film,
 )
+from mdr_dask.physics.lubrication.grid_solution import cell_around
 from mdr_dask.physics.lubrication.line_contact import (
     ACCURACY,
     NODES,
@@ -33,9 +32,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Outputs that are positions x/a. The relative error of a position is the error of x/a, divided by the absolute value
-#: of x/a. If this absolute value is below 1, the error is not divided.
-_POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
+#: A position x/a has an error relative to the half width a, unless the position lies outside the contact.
+_FLOORS = {"spike_position": 1.0}
 
 
 def _groups(block: Block[EhlLineParameters]) -> Groups:
@@ -60,108 +58,99 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
     ]
 
 
-def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return, for each output, a function that computes the output from the solution on one grid.
-
-    The functions return positions divided by the half width a, film thicknesses divided by a^2/R, and pressures
-    divided by Hertz' maximum pressure.
-    """
-    p0 = highest_pressure(case.contact_modulus, W)
+def _readings(block: Block[EhlLineParameters], index: int, W: float, contact: LineContact) -> dict[str, Reading]:
+    """Return, for each requested output, a function that computes the output from the solution on one grid."""
+    case, film = block.case(index), square_of_half_width(W)
+    p0 = 2 * case.contact_modulus * float(np.sqrt(W / (2 * np.pi)))
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
     place = positions(case)
-    return {
-        "film": lambda grid: grid.film_between(place),
-        "pressure": lambda grid: grid.pressure_between(place),
-        "minimum_position": lambda grid: grid.minimum[0],
-        "rupture_position": lambda grid: grid.rupture,
-        "spike_position": lambda grid: grid.spike[0],
-        "spike_pressure": lambda grid: grid.spike[1],
+    readings: dict[str, Reading] = {
+        "film": lambda grid: film * grid.film_between(place),
+        "pressure": lambda grid: p0 * grid.pressure_between(place),
+        "spike_position": lambda grid: grid.spike,
         "traction_coefficient": lambda grid: traction.sliding_coefficient(
             contact, grid, W, case.slide_roll_ratio, stress
         ),
-        "rolling_coefficient": lambda grid: traction.rolling_coefficient(grid, W),
     }
-
-
-def highest_pressure(contact_modulus: float, W: float) -> float:
-    """Return Hertz' maximum pressure p0 in Pa."""
-    return 2 * contact_modulus * float(np.sqrt(W / (2 * np.pi)))
+    return {name: reading for name, reading in readings.items() if name in block.outputs}
 
 
 def _estimates(
-    case: EhlLineParameters, W: float, solution: LineSolution, outputs: Collection[str]
+    block: Block[EhlLineParameters], index: int, W: float, solution: LineSolution, read: dict[str, Estimate]
 ) -> dict[str, Estimate]:
-    """Return the requested outputs of a solution, and the errors, both in the units of the outputs."""
-    film, p0 = square_of_half_width(W), highest_pressure(case.contact_modulus, W)
-    metres = film * (np.nan if case.radius is None else case.radius)
-    place, readings = positions(case), _readings(case, W, solution.case)
-    found: dict[str, Callable[[], Estimate]] = {
-        "central_film": lambda: solution.central_film.scaled(film),
-        "minimum_film": lambda: solution.minimum_film.scaled(film),
-        "central_film_thickness": lambda: solution.central_film.scaled(metres),
-        "minimum_film_thickness": lambda: solution.minimum_film.scaled(metres),
-        "film": lambda: solution.profile(lambda grid, x: grid.film_between(x), place).scaled(film),
-        "pressure": lambda: solution.profile(lambda grid, x: grid.pressure_between(x), place).scaled(p0),
-        "minimum_position": lambda: solution.position(readings["minimum_position"]),
-        "rupture_position": lambda: solution.position(readings["rupture_position"]),
-        "spike_position": lambda: solution.spike()[0],
-        "spike_pressure": lambda: solution.spike()[1].scaled(p0),
-        "traction_coefficient": lambda: solution.estimate(readings["traction_coefficient"]),
-        "rolling_coefficient": lambda: solution.estimate(readings["rolling_coefficient"]),
-    }
-    return {name: estimate() for name, estimate in found.items() if name in outputs}
+    """Return the requested outputs of a case, with their errors. `read` contains the results of `_readings`."""
+    found, radius = dict(read), block.case(index).radius
+    for name, film in (("central_film", solution.central_film), ("minimum_film", solution.minimum_film)):
+        found[name] = film.scaled(square_of_half_width(W))
+        found[f"{name}_thickness"] = found[name].scaled(np.nan if radius is None else radius)
+    if "spike_position" in found:
+        found["spike_position"] = _spike(solution)
+    return {name: estimate for name, estimate in found.items() if name in block.outputs}
+
+
+def _spike(solution: LineSolution) -> Estimate:
+    """Return the position of the spike on the finest grid. The error is its last movement plus the width of a cell."""
+    places = np.array([grid.spike for grid in solution.grids[-3:]])
+    moves = np.abs(np.diff(places))
+    moved = float(max(moves[-1], 0.5 * moves[-2])) if moves.size > 1 else np.inf
+    before, after = cell_around(solution.finest.nodes, places[-1])
+    return Estimate(places[-1], np.asarray((np.inf if np.isnan(moved) else moved) + (after - before)))
 
 
 def compute(block: Block[EhlLineParameters]) -> Result:
-    """Solve the cases of a block. Equal cases are solved only once. All realisations of a case have the same result."""
-    parameters = _groups(block)
-    given = {
-        "formula_central_film": PAN_HAMROCK_CENTRAL(*parameters),
-        "formula_minimum_film": PAN_HAMROCK_MINIMUM(*parameters),
-    }
+    """Solve the cases of a block. All realisations of a case have the same result.
+
+    Equal contacts share a solution, even if the sliding differs, unless the traction must meet an accuracy.
+    """
+    parameters, contacts = _groups(block), _line_contacts(block)
+    formulas = {"formula_central_film": PAN_HAMROCK_CENTRAL, "formula_minimum_film": PAN_HAMROCK_MINIMUM}
     shape = (block.cases, len(block.realisations))
     lengths = {"position": block.parameters.profile_points}
     values = {
         name: np.full(shape + tuple(lengths[dim] for dim in MODEL.output(name).dims), np.nan) for name in block.outputs
     }
+    for name in formulas.keys() & values.keys():
+        values[name][:] = formulas[name](*parameters)[:, None]
     result = Result(values, np.full(shape, Status.DONE, dtype=np.int8))
-    solved: dict[tuple[object, ...], LineSolution] = {}
     accuracy = block.accuracy or ACCURACY
-    for index, contact in enumerate(_line_contacts(block)):
-        case, W = block.case(index), float(parameters.W[index])
-        readings = {} if block.accuracy is None else _readings(case, W, contact)
-        readings = {name: reading for name, reading in readings.items() if name in block.outputs}
-        sliding = (W, case.slide_roll_ratio, case.shear_law, case.eyring_stress)
-        key = (contact, *(sliding if "traction_coefficient" in readings else ()))
-        if key not in solved:
-            floors = [1.0 if name in _POSITIONS else 0.0 for name in readings]
-            solved[key] = solve_film(contact, accuracy, [*readings.values()], floors)
-        solution = solved[key]
-        found: dict[str, FloatArray | float] = {name: float(column[index]) for name, column in given.items()}
-        notes = [solution.reason]
-        if solution.outcome == Outcome.CONVERGED:
-            estimates = _estimates(case, W, solution, block.outputs)
-            for name, estimate in estimates.items():
-                found |= {name: estimate.value, f"{name}_error": estimate.error}
-
-            film = float(solution.central_film.value) * square_of_half_width(W)
-            missed = missed_accuracy(
-                {name: [estimate.value] for name, estimate in estimates.items()},
-                {name: [estimate.error] for name, estimate in estimates.items()},
-                accuracy,
-                dict.fromkeys(_POSITIONS, 1.0),
-                f" on {solution.finest.nodes.size} nodes",
-            )
-            notes += [missed.get(0, ""), thick_film(film)]
-        else:
-            result.status[index] = Status.NOT_CONVERGED
-        notes += _warnings(block, index, [float(group[index]) for group in parameters])
-        for name in block.outputs:
-            values[name][index] = found.get(name, np.nan)
-        message = "; ".join(note for note in notes if note)
-        if message:
-            result.messages.update({(index, position): message for position in range(shape[1])})
-    return Result(values, result.status, result.messages, len(solved))
+    alone = block.accuracy is not None and "traction_coefficient" in block.outputs
+    equal: dict[tuple[LineContact, int], list[int]] = {}
+    for index, contact in enumerate(contacts):
+        equal.setdefault((contact, index if alone else 0), []).append(index)
+    for cases in equal.values():
+        readings = [_readings(block, index, float(parameters.W[index]), contacts[index]) for index in cases]
+        solution = solve_film(
+            contacts[cases[0]],
+            accuracy,
+            [reading for each in readings for reading in each.values()],
+            [_FLOORS.get(name, 0.0) for each in readings for name in each],
+            films_only=block.accuracy is None,
+        )
+        estimates = iter(solution.readings)
+        for index, names in zip(cases, readings, strict=True):
+            notes = [solution.reason]
+            if solution.outcome == Outcome.CONVERGED:
+                W, read = float(parameters.W[index]), {name: next(estimates) for name in names}
+                found = _estimates(block, index, W, solution, read)
+                for name, estimate in found.items():
+                    values[name][index] = estimate.value
+                    if f"{name}_error" in values:
+                        values[f"{name}_error"][index] = np.where(np.isnan(estimate.value), np.nan, estimate.error)
+                missed = missed_accuracy(
+                    {name: [estimate.value] for name, estimate in found.items()},
+                    {name: [estimate.error] for name, estimate in found.items()},
+                    accuracy,
+                    _FLOORS,
+                    f" on {solution.finest.nodes.size} nodes",
+                )
+                notes += [missed.get(0, ""), thick_film(float(solution.central_film.value) * square_of_half_width(W))]
+            else:
+                result.status[index] = Status.NOT_CONVERGED
+            notes += _warnings(block, index, [float(group[index]) for group in parameters])
+            message = "; ".join(note for note in notes if note)
+            if message:
+                result.messages.update({(index, position): message for position in range(shape[1])})
+    return Result(values, result.status, result.messages, len(equal))
 
 
 def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[float]) -> list[str]:
@@ -183,9 +172,9 @@ def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of a block.
 
     The number counts the matrix entries in all Newton steps. If a campaign with an accuracy requests the pressure or
-    the pressure spike, a solution needs the finest grid.
+    the position of its spike, a solution needs the finest grid.
     """
-    is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
+    is_sharp = block.accuracy is not None and {"pressure", "spike_position"} & set(block.outputs)
     return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * distinct(block)
 
 

@@ -10,14 +10,7 @@ from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
-from mdr_dask.models.mixed_lubrication.lines import (
-    MOST_POINTS,
-    Generated,
-    Measured,
-    OfSurfaces,
-    Source,
-    points_for,
-)
+from mdr_dask.models.mixed_lubrication.lines import MOST_POINTS, Generated, Measured, Source, points_for
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import STEEL, HertzLine, hertz_line
@@ -106,12 +99,9 @@ class MixedLubrication(Parameters):
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
         default="mobilgear_shc_xmp_320", description="a named oil, or the viscosities of a data sheet or a table"
     )
-    pressure_viscosity: (
-        Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
-    ) = quantity(
+    pressure_viscosity: Positive | Literal["oil"] = quantity(
         "1/Pa",
-        "pressure-viscosity coefficient alpha, or the name of a correlation that gives alpha as a function of the "
-        "viscosity; the value oil selects the correlation that belongs to the oil",
+        "pressure-viscosity coefficient alpha; oil: as a function of the viscosity, by the correlation of the oil",
         usual="20 1/GPa",
         default="oil",
     )
@@ -121,13 +111,6 @@ class MixedLubrication(Parameters):
     )
     film_thickness: Positive | None = quantity(
         "m", "film thickness h0, if it is known; film_formula is then not used", usual="100 nm", default=None
-    )
-    edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
-        default="part",
-        description="treatment of a cluster of asperities that lies across an edge of the contact. part: only the part "
-        "of the cluster inside the contact is tested for breakthrough, and this part is counted. clip: the whole "
-        "cluster is tested, but only the part inside is counted. whole: the whole cluster is tested and counted. "
-        "inside: the cluster is ignored",
     )
     roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
     roller_width: float = quantity(
@@ -194,11 +177,9 @@ class MixedLubrication(Parameters):
             grids = (points,)
         else:
             grids = (points // 2, points)
-        waves = grids, self.perimeter / self.longest(), modes
-        if one is not None and two is not None:
-            return OfSurfaces(*waves, one, two, self.perimeter)
-        assert self.hurst is not None
-        return Generated(*waves, self.hurst)
+        roughness = (one, two) if one is not None and two is not None else self.hurst
+        assert roughness is not None
+        return Generated(grids, self.perimeter, self.perimeter / self.longest(), modes, roughness)
 
     def longest(self) -> float:
         """Return the longest wavelength of the roughness in m."""
@@ -213,7 +194,7 @@ class MixedLubrication(Parameters):
             return problem
         try:
             source = self.source()
-            return source.problem(self.perimeter) or self._problem_of_width(source)
+            return source.problem() or self._problem_of_width(source)
         except DataError as error:
             return str(error)
 
@@ -231,10 +212,12 @@ class MixedLubrication(Parameters):
         return "" if self.hurst is None else "surface_1 and surface_2 replace hurst: leave out one or the other"
 
     def _problem_of_width(self, source: Source) -> str:
-        length = source.length(self.perimeter)
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
-        if width > length:
-            return f"expected a contact width 2a of at most the length of the line, {length:.9g} m, got {width:.9g} m"
+        if width > source.length:
+            return (
+                f"expected a contact width 2a of at most the length of the line, {source.length:.9g} m, "
+                f"got {width:.9g} m"
+            )
         return ""
 
     def oil_data(self) -> Oil:

@@ -1,8 +1,7 @@
-"""The two rough lines of a case: self-affine, with the spectra of measured surfaces, or measured."""
+"""The two rough lines of a case: with random phases, or measured."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -27,35 +26,39 @@ def points_for(modes: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class _Random(ABC):
-    """Base class of pairs of rough lines with random phases.
+class Generated:
+    """Two lines with random phases: self-affine with unit rms height, or with the spectra of measured surfaces, in m.
 
     `points` is the number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
-    `longest` is the circumference of a roller divided by the longest wavelength, and `modes` is the circumference
-    divided by the shortest wavelength.
+    `length` is the circumference of a roller in m. `longest` is this length divided by the longest wavelength, and
+    `modes` is the length divided by the shortest wavelength. `roughness` is the Hurst exponent or the two surfaces. The
+    realisations use the files of a surface in turn.
     """
 
     points: tuple[int, ...]
+    length: float
     longest: float
     modes: int
+    roughness: float | tuple[Surface, Surface]
 
-    def length(self, perimeter: float) -> float:
-        """Return the length of a line in m, which is the circumference `perimeter` of a roller."""
-        return perimeter
-
-    def problem(self, perimeter: float) -> str:
+    def problem(self) -> str:
         """Return the reason why the lines cannot be made, or an empty string."""
         if self.longest > self.modes:
-            longest, shortest = perimeter / self.longest, perimeter / max(self.modes, 1)
+            longest, shortest = self.length / self.longest, self.length / max(self.modes, 1)
             return f"expected the longest wavelength above the shortest, got {longest:.9g} m and {shortest:.9g} m"
         if 2 * self.modes > self.points[-1]:
-            wave, least = perimeter / self.modes, 2 * perimeter / self.points[-1]
+            wave, least = self.length / self.modes, 2 * self.length / self.points[-1]
             return f"expected a shortest wavelength of at least two point spacings, {least:.9g} m, got {wave:.9g} m"
+        if isinstance(self.roughness, tuple) and not all(np.any(line) for both in self._amplitudes() for line in both):
+            return "expected roughness of both surfaces between longest_wavelength and shortest_wavelength, got none"
         return ""
 
-    @abstractmethod
-    def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of the waves of line 1 and of line 2."""
+    def combined_rms(self) -> float:
+        """Return the rms height of the sum of the two lines. Mean squares are averaged over all files."""
+        if not isinstance(self.roughness, tuple):
+            return float(np.sqrt(2.0))
+        squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._amplitudes()]
+        return float(np.sqrt(sum(squares)))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).
@@ -67,60 +70,17 @@ class _Random(ABC):
         from mdr_dask.physics.surfaces.splines import closest
 
         phases = phase_factors(seed, realisation, 2 * self.modes).reshape(-1, 2).T
-        amplitudes = self.amplitudes(realisation)
+        amplitudes = [lines[realisation % len(lines)] for lines in self._amplitudes()]
         return np.array([closest(0.5 * a * phase, points) for a, phase in zip(amplitudes, phases, strict=True)])
 
-
-@dataclass(frozen=True)
-class Generated(_Random):
-    """Two self-affine lines of unit rms height."""
-
-    hurst: float
-
-    def combined_rms(self) -> float:
-        """Return the rms height of the sum of the two lines."""
-        return float(np.sqrt(2.0))
-
-    def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of the waves of line 1 and of line 2."""
+    def _amplitudes(self) -> list[list[FloatArray]]:
+        """Return the amplitudes of the waves of line 1 and of line 2, for each file."""
         from mdr_dask.physics.surfaces import roughness
 
-        amplitude = roughness.amplitudes(self.modes, self.hurst, longest=self.longest)
-        return amplitude, amplitude
-
-
-@dataclass(frozen=True)
-class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m. The realisations use the files of a surface in turn."""
-
-    surface_1: Surface
-    surface_2: Surface
-    perimeter: float
-
-    def combined_rms(self) -> float:
-        """Return the rms height in m of the sum of the two lines. Mean squares are averaged over all files."""
-        squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
-        return float(np.sqrt(sum(squares)))
-
-    def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of the waves of line 1 and of line 2."""
-        first, second = (lines[realisation % len(lines)] for lines in self._both())
-        return first, second
-
-    def problem(self, perimeter: float) -> str:
-        """Return the reason why the lines cannot be made, or an empty string."""
-        flat = "expected roughness of both surfaces between longest_wavelength and shortest_wavelength, got none"
-        return super().problem(perimeter) or (
-            "" if all(np.any(line) for both in self._both() for line in both) else flat
-        )
-
-    def _both(self) -> tuple[list[FloatArray], list[FloatArray]]:
+        if not isinstance(self.roughness, tuple):
+            return [[roughness.amplitudes(self.modes, self.roughness, longest=self.longest)]] * 2
         waves = np.arange(1, self.modes + 1) >= self.longest * (1 - 1e-12)
-        first, second = (
-            [line * waves for line in lines_of(surface, self.perimeter, self.modes)]
-            for surface in (self.surface_1, self.surface_2)
-        )
-        return first, second
+        return [[line * waves for line in lines_of(each, self.length, self.modes)] for each in self.roughness]
 
 
 @dataclass(frozen=True)
@@ -149,11 +109,12 @@ class Measured:
         one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
         return one if _are_equal(one, two) else min(one, two)
 
-    def length(self, _: float) -> float:
-        """Return the length of the lines in m. This length does not depend on the circumference of the rollers."""
+    @property
+    def length(self) -> float:
+        """Length of the lines in m, which does not depend on the circumference of the rollers."""
         return self.points[-1] * self.spacing
 
-    def problem(self, _: float) -> str:
+    def problem(self) -> str:
         """Return an empty string, because any two measured lines can be combined."""
         return ""
 
@@ -161,7 +122,7 @@ class Measured:
         """Return a text with the number of points, the length and the rms heights of the lines before any scaling."""
         first, second = (shown(float(line.std()), "m") for line in self._levelled())
         return (
-            f"both profiles are used without tilt, with {self.points[-1]} points over {shown(self.length(0.0), 'm')}; "
+            f"both profiles are used without tilt, with {self.points[-1]} points over {shown(self.length, 'm')}; "
             f"their rms heights are then {first} and {second}"
         )
 
@@ -214,4 +175,4 @@ def _heights_at(file: ProfileFile, spacing: float) -> FloatArray:
     return np.asarray(CubicSpline(place, line.height)(np.arange(0, place[-1], spacing)), dtype=np.float64)
 
 
-Source = Generated | OfSurfaces | Measured
+Source = Generated | Measured

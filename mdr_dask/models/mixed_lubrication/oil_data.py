@@ -47,7 +47,7 @@ class OilData(Parameters):
     density_temperature: float = quantity(
         "K", "temperature at which the density was measured", usual="15 degC", default=288.15, gt=0
     )
-    correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
+    correlation: Literal["gold_mineral", "gold_polyalphaolefin"] = Field(
         default="gold_mineral",
         description="correlation that gives the pressure-viscosity coefficient as a function of the viscosity",
     )
@@ -96,7 +96,7 @@ class OilData(Parameters):
         """The oil that these data define."""
         one, _, two, _ = data = self.two_viscosities
         low, high = self.lowest_temperature or min(one, two), self.highest_temperature or max(one, two)
-        return Oil(*data, self.density, self.density_temperature, self.correlation, low, high, "campaign file")
+        return Oil(*data, self.density, self.density_temperature, self.correlation, low, high)
 
     def notes(self) -> tuple[str, ...]:
         """Return notes about the fit of Walther's law to the table, and about extrapolated viscosities."""

@@ -55,16 +55,16 @@ class Revolution:
 def revolve(operation: Operation, lines: FloatArray) -> Revolution:
     """Find the intimate contact during one revolution. `lines` are the splines of both lines, shape (2, points)."""
     case, points = operation.case, lines.shape[1]
-    spacing, creep = operation.length / points, case.slide_roll_ratio
+    spacing, creep = operation.source.length / points, case.slide_roll_ratio
     width = operation.width / spacing
     if creep == 0:
-        clusters = find_clusters(lines.sum(axis=0), operation.level, spacing, operation.strength)
-        contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width, case.edge_rule)
+        clusters = find_clusters(lines.sum(axis=0), operation.film / operation.scale, spacing, operation.strength)
+        contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width)
     else:
         # a finer grid has more windows, so that the change between two grids includes the error of the window spacing
-        stride = max(1, int(operation.width / operation.length * operation.source.points[0] / WINDOWS))
+        stride = max(1, int(operation.width / operation.source.length * operation.source.points[0] / WINDOWS))
         contact = _windows(operation, lines, np.arange(0, points, stride))
-    parts = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
+    parts = max(1, min(PARTS, int(operation.source.length / (2 * operation.width))))
     return Revolution(contact, spacing / breakthrough.PARTS, parts)
 
 
@@ -73,10 +73,10 @@ def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> Int
 
     The distances in `travels` are divided by the spacing of the points.
     """
-    spacing = operation.length / lines.shape[1]
-    pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
+    spacing = operation.source.length / lines.shape[1]
+    pair = breakthrough.Pair(lines[0], lines[1], operation.film / operation.scale, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)
-    return breakthrough.judge_windows(pair, operation.width / spacing, starts, operation.case.edge_rule)
+    return breakthrough.judge_windows(pair, operation.width / spacing, starts)
 
 
 def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> dict[str, float]:
@@ -115,7 +115,7 @@ def drawn(
         starts = breakthrough.creep_positions(travels, points, case.slide_roll_ratio)
         half_width = float(operation.contact.half_width)
         x = POSITIONS * half_width
-        nodes = (x + half_width) / operation.length * points
+        nodes = (x + half_width) / operation.source.length * points
         upper, lower = (
             operation.scale * np.interp(nodes + start[0], np.arange(points), heights(line), period=points)
             for start, line in zip(starts, lines, strict=True)

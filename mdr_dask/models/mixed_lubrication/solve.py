@@ -59,12 +59,16 @@ def compute(block: Block[MixedLubrication]) -> Result:
             continue
         groups.setdefault(operation.source, []).append((index, operation))
         fixed = fixed_values(operation)
-        _store(result, block, index, slice(None), fixed)
         if 0 in block.realisations:
             for warning in _warnings(operation, block.outputs):
                 result.add_message(index, block.realisations.index(0), warning)
+        relative = {
+            name: fixed[f"{name}_error"] / max(fixed[name], _FLOORS.get(name, 0.0))
+            for name in fixed
+            if fixed.get(f"{name}_error", 0.0) > 0
+        }
         for position in range(len(block.realisations)):
-            _add_missed(result, block, index, position, fixed, _FLOORS)
+            _store(result, block, (index, position), fixed, relative)
         result.status[index] = Status.DONE
     if _OF_LINES & set(block.outputs):
         for source, members in groups.items():
@@ -74,28 +78,20 @@ def compute(block: Block[MixedLubrication]) -> Result:
 
 
 def _store(
-    result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
-) -> None:
-    for name in found.keys() & set(block.outputs):
-        result.values[name][index, position] = found[name]
-
-
-def _add_missed(
     result: Result,
     block: Block[MixedLubrication],
-    index: int,
-    position: int,
-    found: Mapping[str, float],
-    floors: Mapping[str, float],
+    at: tuple[int, int],
+    found: Mapping[str, Any],
+    errors: Mapping[str, float],
     advice: str = "",
 ) -> None:
-    if block.accuracy is None:
-        return
-    known = [name for name in block.outputs if np.isfinite(found.get(name, np.nan))]
-    values = {name: [found[name]] for name in known}
-    errors = {name: [found.get(f"{name}_error", 0.0)] for name in known}
-    for text in missed_accuracy(values, errors, block.accuracy, floors).values():
-        result.add_message(index, position, text + advice)
+    """Store outputs of a case and realisation, and add a message if the relative `errors` miss the accuracy."""
+    for name in found.keys() & set(block.outputs):
+        result.values[name][at] = found[name]
+    if block.accuracy is not None:
+        stated = {name: [error] for name, error in errors.items() if name in block.outputs}
+        for text in missed_accuracy({name: [1.0] for name in stated}, stated, block.accuracy).values():
+            result.add_message(*at, text + advice)
 
 
 def _realise(
@@ -131,19 +127,15 @@ def _realise(
     errors = refine(solve, len(members), points, accuracy, order=1, floors=floors).errors
     for k, (index, operation) in enumerate(members):
         of_length = errors[-1, k] * operation.width if with_length else np.nan
-        numbers = values(operation, found[k], np.array([errors[0, k], of_length]))
-        length, found_length = operation.width * _FLOORS["contact_length"], numbers["contact_length"]
-        # conductance and resistance have the same relative error as the length
-        floors_here = {
-            "breakthrough_probability": _FLOORS["breakthrough_probability"],
-            "contact_length": length,
-            "contact_conductance": length * operation.squares / operation.case.resistivity,
-            "contact_resistance": numbers["contact_resistance"]
-            * max(1.0, length / found_length if found_length else 1.0),
+        numbers = values(operation, found[k], np.array([errors[0, k], of_length])) | arrays[k]
+        relative = {
+            "breakthrough_probability": errors[0, k] / max(found[k].probability, _FLOORS["breakthrough_probability"])
         }
+        if with_length:  # conductance and resistance have the same relative error as the length
+            of_all = errors[-1, k] / max(found[k].length / operation.width, _FLOORS["contact_length"])
+            relative |= dict.fromkeys(("contact_length", "contact_conductance", "contact_resistance"), of_all)
         advice = "" if operation.case.points == "auto" else " (increase points)"
-        _add_missed(result, block, index, position, numbers, floors_here, advice)
-        _store(result, block, index, position, numbers | arrays[k])
+        _store(result, block, (index, position), numbers, relative, advice)
 
 
 def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:

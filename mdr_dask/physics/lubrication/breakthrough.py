@@ -2,8 +2,8 @@
 
 A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``. The cluster breaks
 the layer if ``int (z - h0) dx > s D^3``, with the length D of the interval and the result s of `layer_strength` (eqs.
-5.5, 5.6). The contact zone is a window that begins at each node in turn. The lines are closed cubic splines. The first
-node follows the last node, and all integrals are exact.
+5.5, 5.6). The contact zone is a window that begins at each node in turn. A cluster ends at the edges of the window. The
+lines are closed cubic splines. The first node follows the last node, and all integrals are exact.
 """
 
 from __future__ import annotations
@@ -16,14 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
-from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
+from mdr_dask.physics.surfaces.splines import integral, piece, shares
 
-#: Treatment of a cluster that continues beyond an edge of the window; ``inside``: the cluster is ignored.
-#: ``part``: the part inside the window is tested and counted, as if the cluster ended at the edge.
-#: ``clip``: the whole cluster is tested, and the part inside the window is counted.
-#: ``whole``: the whole cluster is tested and counted.
-EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
-_PART, _CLIP, _WHOLE, _INSIDE = range(4)
 PARTS = 64  # number of equal parts of the spacing of nodes; lengths in contact are whole numbers of parts
 
 
@@ -61,15 +55,11 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 
 @jit
-def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
-    """Add the contribution of a cluster to the windows that contain only the beginning or only the end of the cluster.
-
-    If `judged` is True, the part of the cluster inside the window is tested. Otherwise the whole cluster is tested.
-    """
+def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: NDArray[np.int32]) -> None:
+    """Add the contribution of a cluster to the windows that contain only its beginning or only its end."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
-    always = total > limit * (end - start) ** 3
-    longest = min(window, reach) if judged else window
+    longest = min(window, reach)
     width = int(window)
     beyond = window - width  # distance from the last node in the window to the right edge of the window
     first, second, third, fourth = shares(beyond)
@@ -79,10 +69,10 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
         k = node if node < points else node - points
         head, tail = node + beyond - start, end - node
         force = first * overlap[k] + second * overlap[k + 1] + third * overlap[k + 2] + fourth * overlap[k + 3]
-        breaks = until_node + force > limit * head * head * head if judged else always
+        breaks = until_node + force > limit * head * head * head
         if breaks and 0 < head < end - start and head <= longest:
             _block(jumps, node - width, 1, _counted(head))
-        breaks = total - until_node > limit * tail * tail * tail if judged else always
+        breaks = total - until_node > limit * tail * tail * tail
         if breaks and node > start and tail <= longest:
             _block(jumps, k, 1, _counted(tail))
         until_node += whole_piece(overlap, k)
@@ -90,11 +80,10 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
 
 
 @jit
-def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
+def _add_middles(clusters: Clusters, c: int, window: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to all windows that lie entirely within this cluster."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
-    always = clusters.total[c] > limit * (end - start) ** 3
     first, last = (0, points - 1) if clusters.closed else (int(start) + 1, int(np.ceil(end - window)) - 1)
     width = int(window)
     beyond = window - width
@@ -104,13 +93,13 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
     for node in range(first, last + 1):
         edge = (node + width) % points
         inside = force + integral(piece(overlap, edge), beyond)
-        if inside > limit * window**3 if judged else always:
+        if inside > limit * window**3:
             _block(jumps, node, 1, _counted(window))
         force += whole_piece(overlap, edge) - whole_piece(overlap, node % points)
 
 
 @jit
-def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
+def _collect(clusters: Clusters, window: float, jumps: NDArray[np.int32]) -> None:
     """Write the lengths in contact of all windows to `jumps`. At first, `jumps` must contain zeros."""
     points = jumps.size - 1
     # a part of a cluster that is longer than `reach` cannot break the layer
@@ -119,33 +108,29 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
         start, end = clusters.start[c], clusters.end[c]
         length = end - start
         broken = clusters.total[c] > clusters.limit * length**3
-        if rule == _WHOLE and broken:
-            first = int(np.ceil(start - window))
-            _block(jumps, first, min(int(np.ceil(end)) - first, points), _counted(length))
-        elif rule != _WHOLE and broken and not clusters.closed:
+        if broken and not clusters.closed:
             first = int(np.ceil(end - window))
             if first <= start:
                 _block(jumps, first, int(start) - first + 1, _counted(length))
-        if rule == _PART or (rule == _CLIP and broken):
-            if not clusters.closed:
-                _add_cuts(clusters, c, window, rule == _PART, reach, jumps)
-            if clusters.closed or length > window:
-                _add_middles(clusters, c, window, rule == _PART, jumps)
+        if not clusters.closed:
+            _add_cuts(clusters, c, window, reach, jumps)
+        if clusters.closed or length > window:
+            _add_middles(clusters, c, window, jumps)
     height = 0
     for p in range(points):
         height += jumps[p]
         jumps[p] = height
 
 
-def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
+def contact_lengths(clusters: Clusters, window: float) -> NDArray[np.int32]:
     """Return the length in intimate contact, in parts (see `PARTS`), of the window that begins at each node.
 
-    `window` is the length of a window in spacings, and must not exceed the length of the line. `rule` is one of
-    `EDGE_RULES`. The breakthrough probability is the fraction of windows whose length in contact is not zero.
+    `window` is the length of a window in spacings, and must not exceed the length of the line. The breakthrough
+    probability is the fraction of windows whose length in contact is not zero.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
-        _collect(clusters, window, EDGE_RULES.index(rule), trace)
+        _collect(clusters, window, trace)
     return trace[:-1]
 
 
@@ -172,39 +157,10 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 
 @jit
-def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Return the length of a cluster beyond an edge of the window, and the integral of ``z - h0`` over this length.
-
-    The search covers the distance ``|most|``, to the right of the edge if `most` is positive, and to the left of the
-    edge otherwise.
-    """
-    overlap, found = work[:4], work[4:]
-    direction = 1 if most > 0 else -1
-    at, force = edge, 0.0
-    k = int(edge) if direction > 0 else int(np.ceil(edge)) - 1
-    ended = most == 0
-    while not ended:
-        _fill(pair, position[0] + k, position[1] + k, overlap)
-        count = zeros(overlap, 0, found, 0)
-        stop = float(k + max(direction, 0))
-        for number in range(count):
-            place = k + found[number if direction > 0 else count - 1 - number]
-            if not ended and (place - at) * direction > 0:
-                stop, ended = place, True
-        if (stop - edge - most) * direction >= 0:
-            stop, ended = edge + most, True
-        of = piece(overlap, 0)
-        force += direction * (integral(of, stop - k) - integral(of, at - k))
-        at = stop
-        k += direction
-    return abs(at - edge), force
-
-
-@jit
-def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
+def _judge(pair: Pair, position: tuple[int, int], window: float, work: FloatArray) -> int:
     """Return the length in intimate contact of one window. `work` is workspace for ``z - h0`` and the zeros."""
-    points, pieces = pair.line_1.size, int(np.ceil(window))
-    overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
+    pieces = int(np.ceil(window))
+    overlap, found = work[: pieces + 3], work[pieces + 3 :]
     limit = pair.strength * pair.spacing**2
     _fill(pair, position[0], position[1], overlap)
     count = crossings(overlap, found)
@@ -214,18 +170,9 @@ def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work
     for number in range(count + 1):
         end = min(found[number], window) if number < count else window
         if inside and begin < window:
-            length = part = end - begin
-            force = total(overlap, begin, end)
-            whole = begin > 0 and end < window
-            if not whole and rule != _PART:
-                if begin == 0:
-                    more, extra = _reach(pair, position, 0.0, length - points, beyond)
-                    length, force = length + more, force + extra
-                if end == window:
-                    more, extra = _reach(pair, position, window, points - length, beyond)
-                    length, force = length + more, force + extra
-            if force > limit * length**3 and (rule != _INSIDE or whole):
-                contact += _counted(part if rule == _CLIP else length)
+            length = end - begin
+            if total(overlap, begin, end) > limit * length**3:
+                contact += _counted(length)
         begin = end
         inside = not inside
     return contact
@@ -233,23 +180,23 @@ def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work
 
 @jit
 def _windows(
-    pair: Pair, positions: tuple[IntArray, IntArray], window: float, rule: int, work: FloatArray, contact: IntArray
+    pair: Pair, positions: tuple[IntArray, IntArray], window: float, work: FloatArray, contact: IntArray
 ) -> None:
     for w in range(contact.size):
-        contact[w] = _judge(pair, (positions[0][w], positions[1][w]), window, rule, work)
+        contact[w] = _judge(pair, (positions[0][w], positions[1][w]), window, work)
 
 
-def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
+def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray]) -> IntArray:
     """Return the length in intimate contact, in parts (see `PARTS`), of each window.
 
     `positions` holds the node of line 1 and the node of line 2 at the left edge of each window. Rolling with creep
     needs this function (see `creep_positions`). For pure rolling, :func:`contact_lengths` is faster. `window` is the
-    length of a window in spacings, and `rule` is one of `EDGE_RULES`.
+    length of a window in spacings.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
-        work = np.empty(4 * int(np.ceil(window)) + 10)
-        _windows(pair, positions, window, EDGE_RULES.index(rule), work, contact)
+        work = np.empty(4 * int(np.ceil(window)) + 3)
+        _windows(pair, positions, window, work, contact)
     return contact
 
 

@@ -1,4 +1,4 @@
-"""Closed formulas for a lubricated line contact: Hertz contact, film thickness, and lubrication regimes.
+"""Closed formulas for a lubricated line contact: Hertz contact and film thickness.
 
 The velocity is the mean ``u = (u1 + u2)/2``, and films are given as ``h/R`` (thesis section 5.2.1 and appendix B). The
 dimensionless groups are ``W = F/(L' E' R)``, ``U = eta0 u/(E' R)`` and ``G = alpha E'``, with ``E' = 2 E*``.
@@ -6,12 +6,11 @@ dimensionless groups are ``W = F/(L' E' R)``, ``U = eta0 u/(E' R)`` and ``G = al
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 
@@ -53,31 +52,6 @@ def hertz_gap(x: ArrayLike, half_width: float, radius: float) -> FloatArray:
     ratio = np.maximum(1.0, np.abs(np.asarray(x, dtype=np.float64)) / half_width)
     root = np.sqrt(ratio**2 - 1)
     return np.asarray(half_width**2 / (2 * radius) * (ratio * root - np.log(ratio + root)))
-
-
-def fluid_friction(
-    contact: HertzLine,
-    film: float,
-    sliding_velocity: float,
-    log_viscosity: Callable[[FloatArray], FloatArray],
-    eyring_stress: float,
-    film_share: float = 1.0,
-) -> float:
-    """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
-
-    `log_viscosity` returns the natural logarithm of the viscosity in Pa s at pressures in Pa. All other arguments are
-    in SI units. The sliding velocity must not be zero. The shear stress is ``tau_E asinh(eta v/(h tau_E))``, where
-    tau_E is `eyring_stress`. If tau_E is very large, the liquid is Newtonian. `film_share` is the fraction of the load,
-    and of the pressure, that the film carries. Rolling friction is not included.
-    """
-    nodes, weights = np.polynomial.legendre.leggauss(64)
-    cosine = np.cos(np.pi / 2 * nodes)
-    logarithm = log_viscosity(film_share * contact.pressure * cosine) + np.log(
-        abs(sliding_velocity) / (film * eyring_stress)
-    )
-    # asinh(e^l) without an overflow of e^l
-    stress = eyring_stress * np.logaddexp(logarithm, np.logaddexp(2 * logarithm, 0) / 2)
-    return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
 def thick_film(film: float) -> str:
@@ -194,18 +168,16 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
     return Moes(np.asarray(W) / np.sqrt(speed), np.asarray(G) * speed**0.25)
 
 
-#: Names of the regimes, in the order of the rows of `limiting_films`.
-REGIMES = ("rigid isoviscous", "rigid piezoviscous", "elastic isoviscous", "elastic piezoviscous")
-
 RIGID_ISOVISCOUS = 4.894968  # (h_min/R) W/U of a rigid parabola with the Reynolds exit condition (Kapitza)
 RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) if the largest isoviscous pressure is 1/alpha (Blok)
 ELASTIC_ISOVISCOUS = 2.05  # (h_min/R) M^(1/5) (2 U)^(-1/2) of soft bodies (Moes)
 
 
 def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
-    """Return the minimum film ``h/R`` in each of the four limiting regimes, shape (4, ...), in the order of `REGIMES`.
+    """Return the minimum film ``h/R`` in each of the four limiting regimes, shape (4, ...).
 
-    As in Johnson's map of the regimes, the formula of Dowson and Higginson gives the elastic piezoviscous film.
+    The regimes are rigid isoviscous, rigid piezoviscous, elastic isoviscous and elastic piezoviscous. As in Johnson's
+    map of the regimes, the formula of Dowson and Higginson gives the elastic piezoviscous film.
     """
     W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
     M = moes_parameters(W, U, G).M
@@ -223,18 +195,3 @@ def expected_film(M: float, L: float) -> float:
     """Return a first guess of the film in units of ``a^2/R``, taken from the films of the four limiting regimes."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
-
-
-def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
-    """Return the regime of each case as an index of `REGIMES`.
-
-    Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. The isoviscous film is
-    therefore the larger of the two isoviscous limits (rigid and elastic), and the piezoviscous film is the smaller of
-    the two piezoviscous limits. The regime is isoviscous if the isoviscous film is at least as thick as the
-    piezoviscous film.
-    """
-    rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
-    isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)
-    piezoviscous = np.where(elastic_piezo < rigid_piezo, 3, 1)
-    thick = np.minimum(rigid_piezo, elastic_piezo) > np.maximum(rigid_iso, elastic_iso)
-    return np.where(thick, piezoviscous, isoviscous).astype(np.intp)

@@ -69,8 +69,8 @@ class GridSolution:
         return float(_between(self.nodes, self.film, np.zeros(1), 2)[0])
 
     @cached_property
-    def minimum(self) -> tuple[float, float]:
-        """Position and value of the minimum film, interpolated around the node with the thinnest film."""
+    def minimum(self) -> float:
+        """Minimum film in units of ``a^2/R``, interpolated around the node with the thinnest film."""
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         low, high = float(self.nodes[i - 1]), float(self.nodes[i + 1])
         # fifth order, because the interpolation error of a cubic would exceed the discretisation error
@@ -79,20 +79,13 @@ class GridSolution:
             bounds=(low, high),
             options={"xatol": 1e-6 * (high - low)},
         )
-        return float(found.x), float(found.fun)
+        return float(found.fun)
 
     @cached_property
-    def spike(self) -> tuple[float, float]:
-        """Position and pressure of the spike (a second pressure maximum near the outlet), or NaN without a spike."""
+    def spike(self) -> float:
+        """Position of the spike (a second pressure maximum near the outlet), or NaN without a spike."""
         peak, _ = self._spike
-        return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
-
-    @property
-    def resolves_spike(self) -> bool:
-        """Whether the pressure behind the spike needs at least two cells to fall by half of the spike's height."""
-        peak, lowest = self._spike
-        behind = self.pressure[peak:]
-        return peak > 0 and int(np.argmax(behind <= 0.5 * (lowest + behind[0]))) > 1
+        return float(self.nodes[peak]) if peak else float("nan")
 
     @cached_property
     def front(self) -> float:

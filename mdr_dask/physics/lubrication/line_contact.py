@@ -8,7 +8,6 @@ order in the spacing.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,11 +17,11 @@ import numpy as np
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
-from mdr_dask.physics.lubrication.grid_solution import GridSolution, cell_around, expected
+from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.refine import SAFETY, Estimate, Solution, refine
+from mdr_dask.physics.refine import Estimate, Solution, refine
 
 NODES = (40, 80, 160, 320, 640, 1280)  # numbers of nodes of the grids; a Newton step with 1280 nodes takes about 0.1 s
 ORDER = 3.0  # order of convergence of the values extrapolated from two grids
@@ -33,8 +32,6 @@ PRELIMINARY = 2  # the preliminary grids, which determine the density of nodes, 
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
 #: Limits of Newton's method on all further grids. If the first attempt fails, the second limits apply to another guess.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-PLACED = 0.1  # smallest stated error of a position, in cells
-REACH = 2.0  # `profile` states the largest error within this distance, in cells of the second finest grid
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
@@ -127,8 +124,8 @@ class LineSolution:
     """The film of a line contact in Hertz units.
 
     `grids` contains the solutions on all grids, the finest last. `central_film` and `minimum_film` are in units of
-    ``a^2/R``. If no film was found, `outcome` and `reason` give the cause, `grids` is empty, and `central_film` and
-    `minimum_film` are NaN.
+    ``a^2/R``. `readings` contains the values and errors of the requested quantities. If no film was found, `outcome`
+    and `reason` give the cause, `grids` and `readings` are empty, and `central_film` and `minimum_film` are NaN.
     """
 
     case: LineContact
@@ -137,6 +134,7 @@ class LineSolution:
     grids: tuple[GridSolution, ...]
     central_film: Estimate
     minimum_film: Estimate
+    readings: tuple[Estimate, ...] = ()
 
     @property
     def finest(self) -> GridSolution:
@@ -148,73 +146,11 @@ class LineSolution:
         """The larger of the estimated relative errors of central and minimum film."""
         return float(max(film.error / film.value for film in (self.central_film, self.minimum_film)))
 
-    def estimate(self, reading: Reading) -> Estimate:
-        """Return the extrapolated value and the estimated error of a quantity that `reading` evaluates on one grid."""
-        values = [_extrapolated(reading, *pair) for pair in _pairs(self.grids)]
-        return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
-
-    def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
-        """Return a profile at ascending positions in half widths. `read` evaluates the profile on one grid.
-
-        The error at a position is the largest estimated error within `REACH` cells. The estimate at a single position
-        would vanish where the profiles of two grids intersect, and would ignore that a spike or front moves from grid
-        to grid.
-        """
-        pairs = list(_pairs(self.grids))
-        coarse = pairs[-1][0].nodes
-        places = np.union1d(np.concatenate([grid.nodes for grid in pairs[-1]]), positions)
-        values = [_extrapolated(lambda grid: read(grid, places), *pair) for pair in pairs]
-        error = np.nan_to_num(_error(values), nan=0.0, posinf=np.inf)
-        cell = REACH * np.interp(positions, coarse[1:], np.diff(coarse))
-        ends = np.searchsorted(places, positions - cell), np.searchsorted(places, positions + cell, side="right")
-        largest = np.array([error[low:high].max() for low, high in zip(*ends, strict=True)])
-        value = np.interp(positions, places, values[-1])
-        return Estimate(value, np.where(np.isnan(value), np.nan, largest))
-
-    def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths. The stated error is at least `PLACED` cells."""
-        found = self.estimate(reading)
-        before, after = cell_around(self.finest.nodes, float(found.value))
-        return found._replace(error=np.maximum(found.error, PLACED * (after - before)))
-
-    def spike(self) -> tuple[Estimate, Estimate]:
-        """Return position (in half widths) and pressure (in units of p0) of the spike, or NaN if there is no spike.
-
-        Position and pressure are taken from the finest grid. The stated error of the pressure is infinite if the finest
-        grid does not resolve the spike (see `GridSolution.resolves_spike`).
-        """
-        position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
-        grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
-        if not np.isfinite(position[-1]):
-            return NO_ESTIMATE, NO_ESTIMATE
-        before, after = cell_around(grid.nodes, position[-1])
-        moved, risen = (np.inf if each.size < 2 else float(max(each[-1], 0.5 * each[-2])) for each in changes)
-        errors = moved + (after - before), SAFETY * risen if grid.resolves_spike else np.inf
-        where, high = (
-            Estimate(np.asarray(each[-1]), np.asarray(np.inf if np.isnan(error) else error))
-            for each, error in zip((position, height), errors, strict=True)
-        )
-        return where, high
-
-
-def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
-    """Return the last three pairs of a grid and the next finer grid, or all pairs if there are fewer."""
-    return list(itertools.pairwise(solved))[-3:]
-
 
 def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) -> FloatArray:
     """Return a quantity extrapolated from two grids. The extrapolation removes the error of second order."""
     value, ratio = np.asarray(reading(fine)), (coarse.spacing / fine.spacing) ** 2
     return np.asarray(value + (value - np.asarray(reading(coarse))) / (ratio - 1))
-
-
-def _error(values: Sequence[FloatArray]) -> FloatArray:
-    """Return the estimated error of the last extrapolated value, by the rule described in `refine`."""
-    if len(values) < 2:
-        return np.full_like(values[-1], np.inf)
-    changes = np.abs(np.diff(values[-3:], axis=0))
-    before = np.nan_to_num(changes[-2] if len(changes) > 1 else 0.0 * changes[-1]) / 2.0**ORDER
-    return np.asarray(SAFETY / (2.0**ORDER - 1) * np.maximum(changes[-1], before))
 
 
 def _solve_on(
@@ -266,7 +202,12 @@ def _refined(
 
 
 def solve_film(
-    case: LineContact, accuracy: float = ACCURACY, readings: Sequence[Reading] = (), floors: Sequence[float] = ()
+    case: LineContact,
+    accuracy: float = ACCURACY,
+    readings: Sequence[Reading] = (),
+    floors: Sequence[float] = (),
+    *,
+    films_only: bool = False,
 ) -> LineSolution:
     """Return the film and pressure of a lubricated line contact.
 
@@ -278,10 +219,12 @@ def solve_film(
         Allowed relative error of the central film, the minimum film and the `readings`. The grid is refined until no
         estimated error exceeds `accuracy`, or until the finest grid is reached.
     readings : sequence of callable, GridSolution -> float or array
-        Further quantities, or profiles at fixed positions, that must meet the accuracy.
+        Further quantities, or profiles at fixed positions. The error of a profile is its largest error.
     floors : sequence of float
         One floor for each reading, or none if all floors are 0. If a reading is below the floor, the relative error is
         the error divided by the floor.
+    films_only : bool
+        Whether only the central and the minimum film must meet the accuracy.
 
     Returns
     -------
@@ -301,8 +244,8 @@ def solve_film(
         return _no_solution(case, outcome, source)
     solved: list[GridSolution] = []
     # central and minimum film get the larger of the two relative errors, as two grids may agree on one film by chance
-    scales = np.array([source.central_film, source.minimum[1]])
-    wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
+    scales = np.array([source.central_film, source.minimum])
+    wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum]) / scales, *readings]
 
     def add(count: int) -> Outcome:
         before = solved[-2:] if solved and count > NODES[PRELIMINARY] else [source]
@@ -316,14 +259,21 @@ def solve_film(
         if outcome == Outcome.CONVERGED and len(solved) < 2:
             outcome = Outcome.UNDER_WAY  # an extrapolated value needs two grids
         if outcome != Outcome.CONVERGED:
-            none = [np.full_like(np.atleast_2d(reading(source)), np.nan, dtype=np.float64) for reading in wanted]
+            none = [np.full_like(np.asarray(reading(source))[None], np.nan, dtype=np.float64) for reading in wanted]
             return Solution(none, np.array([outcome], np.int8))
-        values = [np.atleast_2d(_extrapolated(reading, *solved[-2:])) for reading in wanted]
+        values = [_extrapolated(reading, *solved[-2:])[None] for reading in wanted]
         return Solution(values, np.array([outcome], np.int8))
 
     add(NODES[0])
     found = refine(
-        solve, 1, NODES[1:], accuracy, ORDER, floors=[0.0, *(floors or np.zeros(len(readings)))], shared=False
+        solve,
+        1,
+        NODES[1:],
+        accuracy,
+        ORDER,
+        floors=[0.0, *(floors or np.zeros(len(readings)))],
+        shared=False,
+        requested=1 if films_only else None,
     )
     error, outcome = found.errors[0, 0] / np.max(found.values[0]), Outcome(int(found.outcome[0]))
     if outcome == Outcome.CONVERGED and not np.isfinite(error):
@@ -331,7 +281,10 @@ def solve_film(
     if outcome != Outcome.CONVERGED:
         return _no_solution(case, outcome, solved[-1] if solved else source)
     central, minimum = (Estimate(film, error * film) for film in found.values[0][0] * scales)
-    return LineSolution(case, Outcome.CONVERGED, "", tuple(solved), central, minimum)
+    others = tuple(
+        Estimate(value[0], error) for value, error in zip(found.values[1:], found.errors[1:, 0], strict=True)
+    )
+    return LineSolution(case, Outcome.CONVERGED, "", tuple(solved), central, minimum, others)
 
 
 def operations(accuracy: float) -> float:

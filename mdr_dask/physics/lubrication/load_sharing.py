@@ -34,23 +34,13 @@ def distance_of_means(gap: float) -> float:
     return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, gap + 1, xtol=1e-13))
 
 
-class Asperities(NamedTuple):
-    """The asperities of two rough lines.
+def asperity_pressure(film: float, rms: float, wavelength: float, E_star: float) -> float:
+    """Return the mean pressure in Pa on asperities at a film in m: ``E*/wavelength`` times the mean overlap.
 
-    `rms` is the rms value of the summed heights in m, `wavelength` the longest wavelength in m, and `E_star` the
-    contact modulus in Pa.
+    The film is taken as the mean gap between the lines. `rms` is the rms value of the summed heights in m, `wavelength`
+    the longest wavelength in m, and `E_star` the contact modulus in Pa.
     """
-
-    rms: float
-    wavelength: float
-    E_star: float
-
-    def pressure(self, film: float) -> float:
-        """Return the mean pressure in Pa for a film in m: ``E*/wavelength`` times the mean overlap.
-
-        The film is taken as the mean gap between the lines.
-        """
-        return self.E_star * self.rms / self.wavelength * mean_overlap(distance_of_means(film / self.rms))
+    return E_star * rms / wavelength * mean_overlap(distance_of_means(film / rms))
 
 
 class SharedLoad(NamedTuple):

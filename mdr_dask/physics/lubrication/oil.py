@@ -15,15 +15,11 @@ from mdr_dask.arrays import FloatArray
 _LUBRICANT_EXPANSION = 0.6278  # expansion in 1/K times density in kg/m^3, both at 60 F (ASTM D1250, table 54D)
 
 #: Pairs (s, t) of Gold's correlation ``alpha = s nu^t 1e-9``, with nu in mm^2/s, for each kind of oil.
-#: The numbers are quoted from memory from Gold et al. 2001 (see docs/evidence/mixed-lubrication.md).
+#: A public repository has the same pair for mineral oils (see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
     "gold_polyalphaolefin": (7.382, 0.1335),
-    "gold_ester": (6.605, 0.1360),
-    "gold_polyglycol": (5.489, 0.1485),
 }
-#: Names of the correlations in :func:`pressure_viscosity`.
-CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
 
 
 def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[float, float]:
@@ -81,26 +77,23 @@ def density_at(temperature: ArrayLike, density: float, reference_temperature: fl
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))
 
 
-def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLike) -> FloatArray:
-    """Return the pressure-viscosity coefficient alpha in 1/Pa by a named correlation.
+def pressure_viscosity(correlation: str, kinematic: ArrayLike) -> FloatArray:
+    """Return the pressure-viscosity coefficient alpha in 1/Pa by Gold's power law of the kinematic viscosity.
 
     Parameters
     ----------
     correlation : str
-        One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity for each kind of oil, or Wooster's
-        ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
-    kinematic, dynamic : array_like
-        Kinematic viscosity in m^2/s and dynamic viscosity in Pa s, both at ambient pressure.
+        Kind of oil, one of the names in `GOLD`.
+    kinematic : array_like
+        Kinematic viscosity in m^2/s at ambient pressure.
 
     Raises
     ------
     ValueError
-        If the correlation is unknown.
+        If the kind of oil is unknown.
     """
-    if correlation == "wooster":
-        return np.asarray((0.6 + 0.965 * np.log10(np.asarray(dynamic, dtype=np.float64) * 1e3)) * 1e-8)
     if correlation not in GOLD:
-        raise ValueError(f"expected one of the correlations {', '.join(CORRELATIONS)}, got {correlation!r}")
+        raise ValueError(f"expected one of the correlations {', '.join(GOLD)}, got {correlation!r}")
     factor, exponent = GOLD[correlation]
     return np.asarray(factor * (np.asarray(kinematic, dtype=np.float64) / 1e-6) ** exponent * 1e-9)
 
@@ -116,15 +109,13 @@ class Oil:
     density, density_temperature : float
         Density in kg/m^3, and the temperature in K at which the density was measured.
     correlation : str
-        Pressure-viscosity correlation, one of `CORRELATIONS`.
+        Pressure-viscosity correlation, one of the names in `GOLD`.
     lowest, highest : float
         Range of temperatures in K in which the data are valid.
-    source : str
-        Source of the numbers.
 
     Examples
     --------
-    >>> oil = Oil(313.15, 320e-6, 373.15, 24e-6, 900.0, 288.15, "gold_mineral", 273.15, 393.15, "data sheet")
+    >>> oil = Oil(313.15, 320e-6, 373.15, 24e-6, 900.0, 288.15, "gold_mineral", 273.15, 393.15)
     >>> print(f"{float(oil.dynamic(333.15)):.3f} Pa s")
     0.094 Pa s
     """
@@ -138,7 +129,6 @@ class Oil:
     correlation: str
     lowest: float
     highest: float
-    source: str
 
     def kinematic(self, temperature: ArrayLike) -> FloatArray:
         """Return the kinematic viscosity in m^2/s at temperatures in K."""
@@ -150,7 +140,7 @@ class Oil:
 
     def alpha(self, temperature: ArrayLike) -> FloatArray:
         """Return the pressure-viscosity coefficient in 1/Pa at temperatures in K, by the correlation of the oil."""
-        return pressure_viscosity(self.correlation, self.kinematic(temperature), self.dynamic(temperature))
+        return pressure_viscosity(self.correlation, self.kinematic(temperature))
 
     def outside(self, temperature: float) -> str:
         """Return a message if a temperature is outside the range of the data, or an empty string."""
@@ -160,7 +150,7 @@ class Oil:
         return f"expected a temperature within the oil's data, {ends}, got {temperature:.9g} K"
 
 
-#: Available oils, by name.
+#: Available oils, by name. The thesis (table A.1) does not state a pressure-viscosity coefficient.
 OILS: dict[str, Oil] = {
     "mobilgear_shc_xmp_320": Oil(
         T1=313.15,
@@ -172,46 +162,12 @@ OILS: dict[str, Oil] = {
         correlation="gold_polyalphaolefin",
         lowest=313.15,
         highest=373.15,
-        source="thesis table A.1: 335 cSt at 40 C, 38.3 cSt at 100 C, specific gravity 0.860 at 15.6 C; "
-        "alpha is not given there: Gold's law for polyalphaolefins",
     ),
 }
 
 
 ROELANDS_PRESSURE = 1.9609e8  # p_r of Roelands' law in Pa
 ROELANDS_LOGARITHM = 9.67  # the constant in ln eta0 + 9.67, with eta0 in Pa s
-
-
-def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return the natural logarithm of the viscosity (in Pa s) under pressure.
-
-    Unlike the viscosity, the logarithm cannot overflow.
-
-    Parameters
-    ----------
-    law : str
-        ``barus`` is the law ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands`` is the law
-        ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa.
-        At ambient pressure, the derivative with respect to p is alpha in both laws.
-    pressure : array_like
-        Pressure in Pa.
-    viscosity, alpha : array_like
-        Viscosity in Pa s and pressure-viscosity coefficient in 1/Pa at ambient pressure.
-
-    Raises
-    ------
-    ValueError
-        If the law is unknown.
-    """
-    p, logarithm = np.asarray(pressure, dtype=np.float64), np.log(np.asarray(viscosity, dtype=np.float64))
-    if law == "barus":
-        return np.asarray(logarithm + np.asarray(alpha) * p)
-    if law != "roelands":
-        raise ValueError(f"expected the viscosity law barus or roelands, got {law!r}")
-    scale = logarithm + ROELANDS_LOGARITHM
-    return np.asarray(
-        logarithm + scale * ((1 + p / ROELANDS_PRESSURE) ** (np.asarray(alpha) * ROELANDS_PRESSURE / scale) - 1)
-    )
 
 
 DENSITY_RISE = 0.6e-9  # constant of the density law in 1/Pa (thesis eq. B.6)

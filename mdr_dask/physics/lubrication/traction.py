@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.lubrication.film_formulas import HertzLine
 from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.line_contact import LineContact
-from mdr_dask.physics.lubrication.newton import log_viscosities
+from mdr_dask.physics.lubrication.newton import Liquid, log_viscosities
 
 
 def shear_stress(
@@ -37,7 +38,19 @@ def sliding_coefficient(
     return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
 
 
-def rolling_coefficient(grid: GridSolution, W: float) -> float:
-    """Return the integral of ``(h/2) dp/dx``, which is the rolling friction of one surface, divided by the load."""
-    film = (grid.film[1:] + grid.film[:-1]) / 2
-    return float(2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(grid.pressure)))
+def uniform_film_coefficient(
+    contact: HertzLine, stress: float, liquid: Liquid, eyring_stress: float, film_share: float = 1.0
+) -> float:
+    """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
+
+    `stress` is the Newtonian shear stress in Pa at ambient pressure, ``eta0 v/h``, and must not be zero. The shear
+    stress is ``tau_E asinh(tau/tau_E)``, with the Newtonian stress tau under pressure and `eyring_stress` tau_E in Pa.
+    If tau_E is very large, the liquid is Newtonian. `film_share` is the fraction of the load, and of the pressure, that
+    the film carries. Rolling friction is not included.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    cosine = np.cos(np.pi / 2 * nodes)
+    logarithm = log_viscosities(film_share * cosine, liquid) + np.log(stress / eyring_stress)
+    # asinh(e^l) without an overflow of e^l
+    sheared = eyring_stress * np.logaddexp(logarithm, np.logaddexp(2 * logarithm, 0) / 2)
+    return float(np.sum(weights * sheared * cosine) / (contact.pressure * np.sum(weights * cosine**2)))

@@ -56,8 +56,7 @@ def test_the_integral_of_a_closed_line_does_not_depend_on_where_it_is_closed():
 def test_a_line_wholly_in_contact_is_one_cluster():
     found = clusters_of(np.full(8, 2.0), 1.0, strength=1e-9)
     assert ((found.end - found.start).tolist(), found.closed) == ([8], True)
-    for rule, spacings in (("part", 3), ("clip", 3), ("whole", 8), ("inside", 0)):
-        assert bt.contact_lengths(found, 3.0, rule).tolist() == [spacings * bt.PARTS] * 8
+    assert bt.contact_lengths(found, 3.0).tolist() == [3 * bt.PARTS] * 8
 
 
 def test_a_parabolic_asperity_breaks_if_its_curvature_exceeds_twelve_strengths():
@@ -73,9 +72,8 @@ def test_a_parabolic_asperity_breaks_if_its_curvature_exceeds_twelve_strengths()
             assert (found.total > found.limit * (found.end - found.start) ** 3).tolist() == [broken]
 
 
-@pytest.mark.parametrize("rule", bt.EDGE_RULES)
-def test_sliding_equals_judging_every_window(rule):
-    """Thousands of random windows a rule: random lines, films, windows, shorter and longer than clusters."""
+def test_sliding_equals_judging_every_window():
+    """Thousands of random windows: random lines, films, windows, shorter and longer than clusters."""
     generator = np.random.default_rng(5)
     contacts = 0
     for seed in range(16):
@@ -83,42 +81,31 @@ def test_sliding_equals_judging_every_window(rule):
         line = through_heights(rough_line(points, 1, points // int(generator.integers(2, 6)), 0.5, seed)[0])
         level, window = generator.uniform(-1.5, 1.5), generator.uniform(0.3, points / 3)
         strength = 10 ** generator.uniform(-4, -1)
-        fast = bt.contact_lengths(find_clusters(line, level, 1.0, strength), window, rule)
+        fast = bt.contact_lengths(find_clusters(line, level, 1.0, strength), window)
         every = np.arange(points)
-        slow = bt.judge_windows(bt.Pair(line, np.zeros(points), level, 1.0, strength), window, (every, every), rule)
+        slow = bt.judge_windows(bt.Pair(line, np.zeros(points), level, 1.0, strength), window, (every, every))
         np.testing.assert_array_equal(fast, slow)
         contacts += int((fast > 0).sum())
     assert contacts > 1000
 
 
-def point_by_point(line, level, limit, window, rule):
+def point_by_point(line, level, limit, window):
     """Return whether a window is in contact, and the mean number of its points that are, as the thesis counts them.
 
     A cluster of n points breaks if the sum of their overlaps exceeds ``limit n^3``; windows begin at every point.
     """
     points = line.size
-    line = np.concatenate([line, line, line])
-    overlap = np.where(line > level, line - level, 0.0)
+    overlap = np.tile(line - level, 2)
     lengths = np.zeros(points)
-    edges = np.flatnonzero(np.diff((overlap > 0).astype(int))) + 1
-    edges = edges if overlap[0] == 0 else edges[1:]
-    clusters = list(zip(edges[::2], edges[1::2], strict=False))
-    until = np.concatenate([[0.0], np.cumsum(overlap)])
     for p in range(points):
-        for a, b in clusters:
-            first, last = max(a, points + p), min(b, points + p + window)
-            if last > first:
-                n, force = (
-                    (last - first, until[last] - until[first]) if rule == "part" else (b - a, until[b] - until[a])
-                )
-                counted = b - a if rule == "whole" else last - first
-                if force > limit * n**3 and (rule != "inside" or last - first == b - a):
-                    lengths[p] += counted
+        inside = overlap[p : p + window]
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], inside > 0, [0]])))
+        for a, b in ends.reshape(-1, 2):
+            lengths[p] += b - a if inside[a:b].sum() > limit * (b - a) ** 3 else 0
     return np.mean(lengths > 0), np.mean(lengths)
 
 
-@pytest.mark.parametrize("rule", bt.EDGE_RULES)
-def test_splines_have_the_limit_of_the_thesis_s_points(rule):
+def test_splines_have_the_limit_of_the_thesis_s_points():
     """Lines of ten waves on 200 nodes against the thesis's sums over 6000 points of the same waves."""
     generator = np.random.default_rng(3)
     many, few, window, strength = 6000, 200, 0.15, 6.0  # window and strength over the length of the line
@@ -126,8 +113,8 @@ def test_splines_have_the_limit_of_the_thesis_s_points(rule):
     for _ in range(9):
         spectrum = np.exp(2j * np.pi * generator.uniform(size=10)) / np.arange(1, 11) ** 1.2
         lines = [np.real(np.fft.ifft(np.append(0, spectrum), points)) * points for points in (many, few)]
-        truth = point_by_point(lines[0], 0.4, strength / many**2, round(window * many), rule)
-        found = bt.contact_lengths(clusters_of(lines[1], 0.4, 1 / few, strength), window * few, rule)
+        truth = point_by_point(lines[0], 0.4, strength / many**2, round(window * many))
+        found = bt.contact_lengths(clusters_of(lines[1], 0.4, 1 / few, strength), window * few)
         probabilities.append(truth[0])
         errors.append([np.mean(found > 0) - truth[0], np.mean(found) / bt.PARTS / few - truth[1] / many])
     assert 0.03 < np.mean(probabilities) < 0.9
@@ -141,7 +128,7 @@ def test_geometric_length_of_a_gaussian_line():
     window, values = 500, []
     for seed in range(24):
         line, _, _ = rough_line(100_000, 40, 5000, 0.7, seed)
-        values.append(bt.contact_lengths(clusters_of(line, 1.5, 1.0, 0.0), window, "clip").mean() / bt.PARTS / window)
+        values.append(bt.contact_lengths(clusters_of(line, 1.5, 1.0, 0.0), window).mean() / bt.PARTS / window)
     mean, error = np.mean(values), np.std(values, ddof=1) / np.sqrt(24)
     assert error < 0.02 * mean
     assert abs(mean - ndtr(-1.5)) < 4 * error
@@ -165,12 +152,10 @@ def rig_line(points, seed, cut=100_000):
     return rough_line(points, lowest, cut, 0.7, seed, rms=0.2e-6 * np.sqrt(2))[0]
 
 
-def rig_probability(line, case, rule="part"):
+def rig_probability(line, case):
     h0, half_width = rig_case(*case)
     spacing = PERIMETER / line.size
-    return float(
-        (bt.contact_lengths(clusters_of(line, h0, spacing, STRENGTH), 2 * half_width / spacing, rule) > 0).mean()
-    )
+    return float((bt.contact_lengths(clusters_of(line, h0, spacing, STRENGTH), 2 * half_width / spacing) > 0).mean())
 
 
 CHECKED = {

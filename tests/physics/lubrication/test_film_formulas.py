@@ -1,4 +1,4 @@
-"""Film formulas and regimes: closed forms, and constants derived independently."""
+"""Film formulas: closed forms, and constants derived independently."""
 
 import numpy as np
 import pytest
@@ -70,32 +70,3 @@ def test_limits_depend_on_two_numbers_only():
         # the fourth is a regression, whose rounded exponents keep it only roughly
         np.testing.assert_allclose(films[:3], expected[:3], rtol=1e-12)
         np.testing.assert_allclose(films[3], expected[3], rtol=0.15)
-
-
-@pytest.mark.parametrize(
-    ("point", "name"),
-    [
-        ((1e-8, 1e-9, 10.0), "rigid isoviscous"),
-        ((1e-6, 1e-10, 1e5), "rigid piezoviscous"),
-        ((1e-3, 1e-9, 1.0), "elastic isoviscous"),
-        ((1e-4, 1e-11, 5e3), "elastic piezoviscous"),
-    ],
-)
-def test_regime_of_extreme_points(point, name):
-    assert film.REGIMES[int(film.regime(*point))] == name
-
-
-def test_friction_of_an_isoviscous_newtonian_film_is_shear_times_width():
-    contact = film.hertz_line(8e4, 115e9, 0.025)
-    found = film.fluid_friction(contact, 1e-6, -0.3, lambda p: np.log(0.1) + 0 * p, 1e12)
-    assert found == pytest.approx(0.1 * 0.3 / 1e-6 * 2 * contact.half_width / 8e4, rel=1e-12)
-
-
-def test_eyring_friction_is_newtonian_for_slow_shear_and_smaller_for_fast():
-    contact = film.hertz_line(8e4, 115e9, 0.025)
-    slow, fast = (
-        [film.fluid_friction(contact, 1e-6, v, lambda p: np.log(0.1) + 1e-8 * p, stress) for stress in (5e6, 1e12)]
-        for v in (1e-3, 10.0)
-    )
-    assert slow[0] == pytest.approx(slow[1], rel=1e-6)
-    assert fast[0] < 0.9 * fast[1]

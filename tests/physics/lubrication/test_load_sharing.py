@@ -10,8 +10,8 @@ from scipy.stats import norm
 
 from mdr_dask.physics.lubrication.film_formulas import FORMULAS
 from mdr_dask.physics.lubrication.load_sharing import (
-    Asperities,
     SharedLoad,
+    asperity_pressure,
     distance_of_means,
     mean_overlap,
     share_load,
@@ -19,6 +19,11 @@ from mdr_dask.physics.lubrication.load_sharing import (
 from mdr_dask.physics.surfaces import roughness
 
 E_STAR, RMS, WAVELENGTH = 115.385e9, 0.28e-6, 0.42e-3
+
+
+def on_asperities(film: float) -> float:
+    """Pressure on the asperities of the lines of these tests."""
+    return asperity_pressure(film, RMS, WAVELENGTH, E_STAR)
 
 
 @pytest.mark.parametrize("distance", [-20.0, -3.0, -0.5, 0.0, 0.7, 2.0, 6.0])
@@ -42,41 +47,40 @@ def test_pressure_is_that_of_the_springs_of_two_lines() -> None:
     amplitude = RMS / np.sqrt(2) * roughness.amplitudes(40_000, 0.7, longest=300.0)
     phase = roughness.phases(7, 0, 80_000).reshape(-1, 2)
     heights = sum(sampled(amplitude, phase[:, roller], points) for roller in (0, 1))
-    asperities = Asperities(RMS, WAVELENGTH, E_STAR)
     for distance in (-1.0, 0.0, 1.0):
         film = np.mean(np.maximum(distance * RMS - heights, 0))
         spacing = WAVELENGTH * 300 / points
         force = E_STAR * spacing * np.sum(np.maximum(heights - distance * RMS, 0))  # of 300 squares in a row
         # 300 longest waves: means scatter by some per cent
-        assert asperities.pressure(film) == pytest.approx(force / (300 * WAVELENGTH**2), rel=0.1)
+        assert on_asperities(film) == pytest.approx(force / (300 * WAVELENGTH**2), rel=0.1)
 
 
 @pytest.mark.parametrize("name", list(FORMULAS))
 @pytest.mark.parametrize("ratio", [1e-4, 0.3, 2.0])
 @pytest.mark.parametrize("pressure", [1e7, 1e9])
 def test_shares_add_to_one_and_the_film_is_never_thinner(name: str, ratio: float, pressure: float) -> None:
-    formula, asperities = FORMULAS[name], Asperities(RMS, WAVELENGTH, E_STAR)
+    formula = FORMULAS[name]
     W, U, G = 2e-5, 1e-11, 4000.0
     scale = ratio * RMS / float(formula(W, U, G))
     shared = share_load(
-        lambda share: scale * float(formula(W, U / share, G * share)), lambda film: asperities.pressure(film) / pressure
+        lambda share: scale * float(formula(W, U / share, G * share)), lambda film: on_asperities(film) / pressure
     )
     assert shared.film_share + shared.asperity_share == pytest.approx(1.0, abs=1e-7)
     assert shared.film >= ratio * RMS
     assert shared.film == pytest.approx(ratio * RMS * shared.film_share ** (formula.material - formula.speed), rel=1e-9)
-    assert shared.asperity_share == pytest.approx(asperities.pressure(shared.film) / pressure, rel=1e-9)
+    assert shared.asperity_share == pytest.approx(on_asperities(shared.film) / pressure, rel=1e-9)
 
 
 def test_as_the_film_vanishes_the_asperities_carry_everything() -> None:
     """The film that they leave is that of the dry contact, whatever the formula gives."""
-    asperities, pressure = Asperities(RMS, WAVELENGTH, E_STAR), 1.3e8
+    pressure = 1.3e8
 
     def shared(alone: float) -> SharedLoad:
-        return share_load(lambda share: alone * share**-0.222, lambda film: asperities.pressure(film) / pressure)
+        return share_load(lambda share: alone * share**-0.222, lambda film: on_asperities(film) / pressure)
 
     shares = [shared(film) for film in np.geomspace(1e-6, 1e-16, 12)]
     carried = [each.asperity_share for each in shares]
     assert np.all(np.diff(carried) > -1e-9)
     assert carried[0] < 1e-3
     assert carried[-1] == pytest.approx(1.0, abs=1e-6)
-    assert asperities.pressure(shares[-1].film) == pytest.approx(pressure, rel=1e-6)
+    assert on_asperities(shares[-1].film) == pytest.approx(pressure, rel=1e-6)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, line_contact, solve_film
-from mdr_dask.physics.lubrication.traction import rolling_coefficient, shear_stress, sliding_coefficient
+from mdr_dask.physics.lubrication.film_formulas import hertz_line
+from mdr_dask.physics.lubrication.line_contact import LineSolution, line_contact, solve_film
+from mdr_dask.physics.lubrication.newton import Liquid
+from mdr_dask.physics.lubrication.traction import shear_stress, sliding_coefficient, uniform_film_coefficient
 
 W, U, G, E_STAR = 2.0452e-5, 1e-11, 2500.0, 115.385e9
 
@@ -47,28 +49,14 @@ def test_newtonian_traction_is_proportional_to_sliding_and_zero_in_rolling(solut
     assert sliding(solution, 0.02) == pytest.approx(2 * sliding(solution, 0.01), rel=1e-12)
 
 
-def test_rolling_friction_of_a_rigid_contact_balances_the_pressure() -> None:
-    """The half film times the gradient is, by parts, the pressure on half the slope of the gap."""
-    found = solve_film(LineContact(0.01, 0.0), accuracy=1e-5)
-    small = 1e-6
-    grid = found.finest
-    by_pressure = -2 / np.pi * np.sqrt(8 * small / np.pi) * np.trapezoid(grid.pressure * grid.nodes / 2, grid.nodes)
-    assert rolling_coefficient(grid, small) == pytest.approx(by_pressure, rel=1e-3)  # two quadratures, second order
-    assert by_pressure > 0
-
-
 @pytest.mark.parametrize("eyring_stress", [None, 0.01])
 @pytest.mark.parametrize("law", ["barus", "roelands"])
 def test_errors_of_friction_cover_the_finest_grids(law: str, eyring_stress: float | None) -> None:
     case = line_contact((W, U, G), E_STAR, viscosity_law=law, viscosity=0.08)
-    coarse, fine = solve_film(case, 1e-3), solve_film(case, 3e-5)
-    for read in (
-        lambda grid: sliding_coefficient(case, grid, W, 0.01, eyring_stress),
-        lambda grid: rolling_coefficient(grid, W),
-    ):
-        there, here = fine.estimate(read), coarse.estimate(read)
-        assert abs(here.value - there.value) <= here.error + there.error
-        assert here.error < 0.2 * abs(here.value)
+    readings = [lambda grid: sliding_coefficient(case, grid, W, 0.01, eyring_stress)]
+    (here,), (there,) = (solve_film(case, each, readings, films_only=True).readings for each in (1e-3, 3e-5))
+    assert abs(here.value - there.value) <= here.error + there.error
+    assert here.error < 0.2 * abs(here.value)
 
 
 def test_a_liquid_like_glass_gives_no_overflow() -> None:
@@ -77,3 +65,19 @@ def test_a_liquid_like_glass_gives_no_overflow() -> None:
     with np.errstate(all="raise", under="ignore"):
         assert np.isfinite(sliding_coefficient(case, found.finest, 5e-4, 1.0, None))
         assert 0 < sliding_coefficient(case, found.finest, 5e-4, 1.0, 3e-3) < 1
+
+
+def test_friction_of_an_isoviscous_newtonian_film_is_shear_times_width() -> None:
+    contact = hertz_line(8e4, 115e9, 0.025)
+    found = uniform_film_coefficient(contact, 0.1 * 0.3 / 1e-6, Liquid(0.0, 0.0, 0.0, 0.0, 0.0), 1e12)
+    assert found == pytest.approx(0.1 * 0.3 / 1e-6 * 2 * contact.half_width / 8e4, rel=1e-12)
+
+
+def test_eyring_friction_is_newtonian_for_slow_shear_and_smaller_for_fast() -> None:
+    contact = hertz_line(8e4, 115e9, 0.025)
+    liquid = Liquid(1e-8 * float(contact.pressure), 0.0, 0.0, 0.0, 0.0)
+    slow, fast = (
+        [uniform_film_coefficient(contact, 1e5 * v, liquid, stress) for stress in (5e6, 1e12)] for v in (1e-3, 10.0)
+    )
+    assert slow[0] == pytest.approx(slow[1], rel=1e-6)
+    assert fast[0] < 0.9 * fast[1]
