@@ -11,5 +11,5 @@ BoolArray = NDArray[np.bool_]
 
 
 def random_stream(seed: int, realisation: int) -> np.random.Generator:
-    """Return the random generator of a realisation. All cases and all models draw the same random numbers."""
+    """Return the random generator of a realisation, which is the same for all cases and all models."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))

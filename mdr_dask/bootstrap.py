@@ -97,7 +97,7 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return a sum over all groups: each group contributes the larger positive shift (or 0) of its two rows."""
+    """Return a sum over all groups: the larger shift in the two rows of a group, or 0 if both shifts are negative."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach

@@ -130,7 +130,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the number of operations of a block. Without a count, assume that N results need sqrt(N) blocks."""
+        """Return the operations of a block. If the model counts none, assume that N results need sqrt(N) blocks."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)

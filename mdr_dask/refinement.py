@@ -1,7 +1,7 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Every new value lies halfway between two older values. Cases that differ in other parameters therefore use the same
-values of the axis. To test an interval, the output is predicted from the results at older values only. The interval is
+Every new value lies halfway between two older values. Cases that differ in other parameters therefore share values of
+the axis. To test an interval, the output is predicted from the results at older values only. The interval is
 halved if the error of the prediction exceeds the tolerance.
 """
 
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Number of groups of realisations for the jackknife, which estimates the scatter of a mean from the means without each
-#: group in turn. With 20 groups, the scatter is known to about 15 %.
+#: Number of groups of realisations for the jackknife, which leaves out one group after the other and estimates the
+#: scatter of a mean from the means of the rest. With 20 groups, the scatter is known to about 15 %.
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
 #: Least width of an interval, as a fraction of the axis. This width limits the number of values at a discontinuity.
 FINEST = 2.0**-10
-#: Intervals are always halved until one end has at least this level (3: the eighths of the axis). The outputs at the
-#: quarters (level 2) are predicted from only three values, and the prediction may be right by chance.
+#: Intervals are always halved until one end has at least this level: 1 is the middle of the axis, 2 are its quarters,
+#: and 3 its eighths. The quarters are predicted from only three values, and the prediction may be right by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
 #: the end that was added to the axis later, as fractions of the length of the interval.
@@ -36,8 +36,8 @@ COMPARED = (0.0, 0.25, 0.5, 0.75)
 class Mean(NamedTuple):
     """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
-    # Shape (1 + groups, cases...): the means over all realisations, then the means without each group of realisations.
-    # A case without a successful realisation is NaN.
+    # Along the first axis: the means over all realisations, then the means without each group of realisations. The
+    # other axes are the cases. A case without a successful realisation is NaN.
     groups: FloatArray
     # Shape (cases...): discretisation error of the mean of each case, 0 for an unknown error.
     error: FloatArray
@@ -78,8 +78,8 @@ class Mesh:
     series: Series
     # For each adaptive axis (key: its index in the series), the positions of its values, from 0 to 1.
     shares: Mapping[int, FloatArray]
-    # Mask of the needed cases. The dimensions are the axes of the series. For each combination of values of the
-    # non-adaptive axes, the needed cases are all combinations of some values of the adaptive axes.
+    # Mask of the needed cases. The dimensions are the axes of the series. Each combination of values of the
+    # non-adaptive axes needs certain values of every adaptive axis, in all combinations.
     cases: BoolArray
 
     @classmethod
@@ -227,7 +227,7 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return, for each interval, the largest interpolation error of any line, divided by the tolerance of this line.
+    """Return, for each interval, the largest ratio of interpolation error to tolerance over all lines.
 
     If every line has a failed case at one or both ends of the interval, the result is minus infinity.
     """
@@ -249,10 +249,10 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
     """Return the interpolation error of each interval, shape (lines, values - 1).
 
-    In the two intervals next to a value of level n, the output is predicted from all values of lower levels, once by a
-    monotone cubic and once by a cubic spline. The error is the largest difference between the predictions and the
-    monotone cubic through all values, minus an allowance for the scatter of the realisations and the discretisation
-    errors. The result may be negative.
+    If the end of an interval that was added later has level n, the output in the interval is predicted from all values
+    of lower levels, once by a monotone cubic and once by a cubic spline. The error is the largest difference between
+    the predictions and the monotone cubic through all values, minus an allowance for the scatter of the realisations
+    and the discretisation errors. The result may be negative.
 
     `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
     middle, 2 at the quarters, ... `groups` contains the means described in `Mean.groups`, in an array with three axes:

@@ -436,7 +436,7 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
     for data in found.values():
         if "status" not in data or "realisation" not in data["status"].dims:
             kept = "with its status and realisations (isel(realisation=[0]) keeps a single realisation)"
-            raise DataError(f"expected a study as returned by run or open_study, {kept}, got a Dataset without them")
+            raise DataError(f"expected a study as returned by run or open, {kept}, got a Dataset without them")
     return found
 
 

@@ -313,7 +313,7 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Mark the results that a task should compute as failed, without computing these results."""
+    """Without computing anything, mark the wanted results of a task as failed."""
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED

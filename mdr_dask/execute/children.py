@@ -1,8 +1,8 @@
 """Child processes of this machine that compute blocks. A block that crashes or takes too long does not end the run.
 
-A server process imports all modules and forks the children. Each child has a pipe. The child reads blocks from the pipe
-and writes the outcomes to the pipe. If a child dies, the server reports the death through the pipe of the child and
-forks a new child for the same pipe.
+A server process imports all modules and forks the children. The driver is the process that starts the server. Each
+child has a pipe to the driver, from which it reads blocks, and to which it writes the outcomes. If a child dies, the
+server reports the death through the pipe of the child and forks a new child for the same pipe.
 """
 
 from __future__ import annotations

@@ -136,7 +136,7 @@ class _Run:
             stage = after
 
     def run_rounds(self, stage: Stage) -> int | None:
-        """Run the rounds of a stage; return the number of realisations, or None if a late part is not running."""
+        """Run the rounds of a stage; return the number of realisations, or None if a needed part is not running."""
         replication = stage.campaign.replication
         current = self.plan_round(stage, None)
         while any(mask.any() for mask in current.needed):

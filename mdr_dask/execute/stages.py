@@ -47,8 +47,7 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage (None after the last stage), and an event with the lengths of the
-    axes.
+    """Return the stage that follows a finished stage (None after the last stage), and an event.
 
     The event holds the number of values on each adaptive axis. Only the first `realisations` realisations are used.
     """
@@ -70,7 +69,7 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
     """Return a sentence that says why interpolation along an adaptive axis misses the tolerance in some cases."""
     axis, values = mesh.series.axes[number], mesh.used(number).sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
-    why = f"at_most is {most} values" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"
+    why = f"at_most is {most} values" if (values >= most).any() else "the output jumps or bends in a 1000th of the axis"
     where = f"{series}: " if series else ""
     return f"{where}interpolation along {axis.name} misses its tolerance in {count} of {others} cases: {why}"
 

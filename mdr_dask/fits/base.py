@@ -117,8 +117,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p): exponents or logarithms of factors. `left` returns data minus law. If
     scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the residuals.
-    These fits make the intervals wider. A constant is NaN if `undetermined` marks the constant, given the derivatives
-    at the fitted constants or those at the `stated` constants.
+    These fits make the intervals wider. A constant is NaN if it is `undetermined` by the derivatives of the law at the
+    fitted constants, or by those at the `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -229,7 +229,7 @@ def _signed(number: float, digits: str) -> str:
 
 
 def _percentage(number: float, limit: float) -> str:
-    """Return a percentage with two digits, or with four if the percentage would look like the limit."""
+    """Return a percentage with two digits, or with four if two digits would read like the limit."""
     text = f"{number:.2g}"
     return _plain(text if text != f"{limit:.2g}" else f"{number:.4g}")
 

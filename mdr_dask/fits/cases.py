@@ -68,7 +68,7 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 class Table(NamedTuple):
-    """Values of an output, and discretisation errors of the values, divided by a scale; shape (cases, realisations).
+    """Values of an output and their discretisation errors, both divided by a scale, shape (cases, realisations).
 
     `columns` contains further numbers of each case, such as the load and the velocity.
     """

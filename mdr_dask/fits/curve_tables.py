@@ -134,7 +134,7 @@ FAMILIES = (
     ("frequency", ("compliance",), "temperature"),
     ("time", ("compliance",), "temperature"),
 )
-"""Abscissa, ordinates and group that are found without options. The first family that fits a table is used."""
+"""Abscissa, ordinates and group to use if no option names them. The first family that fits a table is used."""
 
 
 def columns_to_use(

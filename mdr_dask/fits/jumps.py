@@ -155,7 +155,10 @@ def _jump_law(data: xr.Dataset) -> Variables:
             f"{int(known.sum())}"
         )
     of_zeta = "mean zeta in region I; 1 by eq. 4.9", "whether zeta = 1 in region I (eq. 4.9)"
-    of_plateau = f"mean {NUMBERS['jump_over_slope']} on the plateau; 0.4 by eq. 4.10", "whether it is 0.4 (eq. 4.10)"
+    of_plateau = (
+        f"mean {NUMBERS['jump_over_slope']} on the plateau; 0.4 by eq. 4.10",
+        f"whether {NUMBERS['jump_over_slope']} = 0.4 on the plateau (eq. 4.10)",
+    )
     return {
         **_constant(before[:, known], jump[:, known], jumps.count(known)),
         **_limit("zeta", "zeta_holds", 1.0, zeta[:, slow], jumps.count(slow), *of_zeta),
@@ -190,7 +193,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 def _limit(
     name: str, verdict_name: str, stated: float, stack: FloatArray, count: int, meaning: str, question: str
 ) -> Variables:
-    """Return the mean over the cases of a `stack`, and a sentence on whether this mean equals the `stated` value."""
+    """Return the mean over the cases of a `stack`, and a sentence on whether the cases have the `stated` value."""
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
         return nothing | measure(verdict_name, "not tested: no case in this region", question)

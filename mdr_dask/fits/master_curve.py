@@ -101,7 +101,7 @@ def _undetermined(found: Superposition) -> str:
     if not found.undetermined:
         return ""
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
-    return f"not determined {runs}: curves there do not overlap, or look alike wherever they lie, as on a plateau"
+    return f"not determined {runs}: curves there do not overlap, or fit equally well at any shift, as on a plateau"
 
 
 def _inside(groups: FloatArray, reference: float) -> float:

@@ -44,8 +44,8 @@ NARROW = 0.25
 #: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
 #: at most this factor.
 ROUNDED = 1.15
-#: Probability of each interval. Each key is the last part of the names of the ends: nothing in ``x_low`` and
-#: ``x_high``, ``_68`` in ``x_low_68`` and ``x_high_68``.
+#: Probability of each interval. A key is the text that follows ``_low`` and ``_high`` in the names of the ends, such as
+#: ``_68`` in ``x_low_68``.
 LEVELS = {"": 0.95, "_68": 0.6827}
 #: `ENDS`: suffixes of the median and of the ends of the intervals. `SHARES`: cumulative probabilities of the median and
 #: of the ends.

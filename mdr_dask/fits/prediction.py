@@ -17,8 +17,8 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown
 
-#: Relative difference up to which a measured and a computed value of a parameter count as equal. If the study has too
-#: few values for an interpolation, `AGREE` is used.
+#: Relative difference up to which a measured and a computed value of a parameter count as equal. If the axis has too
+#: few values for an interpolation, `mdr_dask.tables.AGREE` is used instead.
 SAME = 1e-6
 #: All cases use the same rough lines. A few modes therefore represent the scatter of all cases. `MODES`: largest number
 #: of modes. `SHARE`: share of the variance that the modes must represent.

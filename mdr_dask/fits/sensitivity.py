@@ -1,7 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. The variance of the output is computed from products of different
-realisations, because products within one realisation contain the variance of the scatter.
+The output is the mean over realisations. The variance of this mean is computed from products of outputs of two
+realisations, because products of outputs of the same realisation contain the variance of the scatter.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mdr_dask.errors import FitError
 
 #: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
-#: Smallest number of base points from which an index is computed, and of cases with a value.
+#: Smallest number of base points from which an index is computed. At least this number of cases must have a value.
 FEWEST = 16
 
 
@@ -27,7 +27,7 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of Saltelli's design, with 95 % intervals.
 
     First-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total indices Jansen (1999).
-    An index is computed from the base points for which all required cases succeeded.
+    An index is computed from the base points (see `_is_saltelli`) at which all cases that the index needs succeeded.
 
     The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
     wide, because points of a Sobol sequence fill space more evenly than random points.
@@ -90,8 +90,8 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 def _is_saltelli(columns: FloatArray) -> bool:
     """Return whether the cases form Saltelli's design.
 
-    Each group of cases in this design consists of a point a, a point b and, for each input, a copy of point a in which
-    this input has the value from point b.
+    Each base point of this design has a group of cases: a point a, a point b and, for each input, a copy of point a in
+    which this input has the value from point b.
     """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
