@@ -61,7 +61,7 @@ class Axis:
 
     # Dotted path in the model's parameters (``velocity``, ``indenter.angle``).
     path: str
-    # Name of the axis's coordinate in the store: the path with ``_`` for ``.``.
+    # Name of the coordinate in the store: the path, in which ``_`` replaces ``.``.
     name: str
     # Dimension of the axis in the store: `name` in a grid, and ``case`` if parameters vary together.
     dim: str

@@ -181,7 +181,7 @@ class _Reader:
             self.document.report(path, f"expected a shorter number, got {len(text)} digits")
             return None
         if _NO_TEXT.search(text):
-            self.document.report(path, "expected text without null characters and damaged characters")
+            self.document.report(path, "expected text without null or damaged characters")
             return None
         digits = text.replace("_", "").casefold()
         if kind == "int":

@@ -1,4 +1,4 @@
-"""Write a first campaign of a model: every parameter with a common value, its unit and its meaning."""
+"""Write a first campaign of a model: every parameter with a usual value, its unit and its meaning."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ realisations: 1                     # samples of each case with other random num
 
 parameters:
 """
-#: `_COMMENTS`: column in which comments begin. `_LONGEST`: values with more characters than this are not written out.
+#: `_COMMENTS`: column in which comments begin. `_LONGEST`: longer defaults are written as ``[...]``.
 _COMMENTS, _LONGEST = 36, 60
 _EXAMPLE_FILE = "table.csv"
 _BOUNDS = ("gt", "ge", "lt", "le")
@@ -70,7 +70,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the dotted names of the required parameters, and of the parameters in each group's first alternative."""
+    """Return the dotted names of required parameters, and of those in the first alternative of each group."""
     groups = getattr(parameters, "alternatives", ())
     return {*fields.required(parameters), *(name for group in groups for name in group[0])}
 
@@ -114,7 +114,7 @@ def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
 
 
 def _scalar(parameters: type[BaseModel], name: str) -> str:
-    """Return a value of a field as text: the default, a common value, or a value within the bounds."""
+    """Return a value of a field as text: the default, a usual value, or a value within the bounds."""
     info = parameters.model_fields[name]
     kinds = fields.members(info.annotation)
     unit = unit_of(parameters, name)

@@ -111,7 +111,7 @@ class _Expansion:
             for one in found:
                 self._complain(
                     one.origin,
-                    f"expected one value, because with a table only its columns vary (add a column to {design.table})",
+                    f"expected one value, because only the columns of the table vary (add a column to {design.table})",
                 )
             return found or sampling.tabled(
                 design.table, self.directory, origin, self.parameters, self.data, self.document.problems, self.remarks

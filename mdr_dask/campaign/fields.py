@@ -91,7 +91,7 @@ def written(kind: type[BaseModel], values: Mapping[str, str]) -> str:
 
 
 def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:
-    """Return the parameter set and the name of the field at a path in the data, or None if there is no such field."""
+    """Return the parameter set that has the field at a path in the data, and the name of the field, or None."""
     kind: type[BaseModel] | None = parameters
     for depth, part in enumerate(path):
         if kind is None or not isinstance(part, str) or part not in kind.model_fields:

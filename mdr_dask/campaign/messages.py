@@ -42,7 +42,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
-        # another message names each missing entry, or what is wrong inside a mapping that may also be a word
+        # other messages name the missing entries of a list, or the mistakes in a mapping that could also be a word
         if inside and group[0]["type"] in ("too_short", "literal_error"):
             continue
         _report_group(path, group, kind, data, report)

@@ -13,7 +13,7 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """A position in a file. Lines and columns count from 1. The column is 0 if the message names the column."""
+    """A position in a file. Lines and columns count from 1. In a CSV file, the column is 0."""
 
     source: str
     line: int

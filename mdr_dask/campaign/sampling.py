@@ -47,8 +47,8 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the points of a Saltelli design. `first` and `second` have the shape (points, inputs).
 
-    A row a of `first` and the same row b of `second` give the points a and b. For every input, the design also
-    contains a copy of a with the value of this input in b.
+    Each row a of `first` and the row b of `second` with the same index are points of the design. For every input, the
+    design also contains a copy of a, in which this input has its value from b.
     """
     import numpy as np
 

@@ -36,7 +36,7 @@ def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
 
 
 def write_answer(answer: Table, path: Path) -> int:
-    """Write a table to a file in the format of the suffix of `path`, and return the number of rows."""
+    """Write a table to a file in the format that the suffix of `path` states, and return the number of rows."""
     rows = 0
 
     def counted() -> Iterator[pd.DataFrame]:

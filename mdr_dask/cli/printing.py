@@ -76,7 +76,7 @@ def titled(name: str, unit: str) -> str:
 
 
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
-    """Print columns side by side. If a table is too wide, print a single row as a list, and several rows in parts.
+    """Print columns side by side. A table that is too wide is printed in parts or, if it has one row, as a list.
 
     Each part begins with the first `keys` columns. Columns with the same value in all rows, and columns without values,
     are named in a line that begins with `note`.
@@ -247,7 +247,7 @@ def _error(error: float, size: float) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Return a number with `digits` digits. Only numbers from 1e10 or below 1e-4 have an exponent."""
+    """Return a number with `digits` digits. Only numbers below 1e-4 and numbers of at least 1e10 have an exponent."""
     return f"{float(f'{value:.{digits}g}'):.10g}"
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.option(
     "--repair",
     is_flag=True,
-    help="Write metadata again; remove damaged blocks and coordinates for the next run.",
+    help="Write damaged metadata again; remove damaged blocks and coordinates, which the next run writes again.",
 )
 @limit_option
 @json_option

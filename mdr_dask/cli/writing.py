@@ -41,7 +41,7 @@ def require_outside(path: Path) -> None:
     """Raise UsageError for a file inside a store, because an additional file counts as damage."""
     groups = [folder for folder in path.absolute().parents if (folder / "zarr.json").is_file()]
     if groups:
-        from mdr_dask.store import is_study  # imported here, because this module imports Zarr
+        from mdr_dask.store import is_study  # imported only here, because mdr_dask.store imports Zarr
 
         for folder in filter(is_study, map(str, groups)):
             raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder}")

@@ -119,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for a condition. In `status`, a row equals ``failed`` if any result of the row failed."""
+        """Return a column for a condition. ``status == failed`` is true in every row with a failed result."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found

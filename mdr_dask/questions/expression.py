@@ -29,7 +29,7 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 }
 #: Numbers in conditions and selections count as equal up to this relative difference. Tables show six digits.
 SAME = 1e-5
-#: Dimension of a column with several words in each row. A row equals each of its words.
+#: Dimension of a column with several words in each row. A comparison is true if it is true for any word of the row.
 ALTERNATIVES = "alternatives"
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -136,7 +136,7 @@ def _likely_mistake(text: str) -> str:
     unit = re.search(rf"(?:{_NUMBER.pattern})\s*([^\W\d]\w*)", text)
     if unit and unit[1] not in _KEYWORDS:
         return f"; unknown unit {unit[1]!r}"
-    return "; == compares" if re.search(r"[^<>=!]=[^=]", text) else ""
+    return "; write == to compare" if re.search(r"[^<>=!]=[^=]", text) else ""
 
 
 def _name(node: ast.expr) -> str:

@@ -97,7 +97,7 @@ def _members(
 
 
 def _common(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the results of every group (see `averaged`), shape (groups, ..., realisations)."""
+    """Return the results of every group (see `averaged`), with the dimensions (group, ..., realisation)."""
     there = np.isfinite(values)
     number = there.sum(axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -94,7 +94,7 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return, for each SI unit, the unit of the campaign file if there is only one, and degC for K if there is none."""
+    """Return the only unit that the campaign file uses for each SI unit, and degC for K if the file has none for K."""
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():

@@ -85,7 +85,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
-    """Keep the named outputs, or without names all outputs with one number for each result, and their errors."""
+    """Keep the named outputs and their errors. Without names, keep all outputs with one number for each result."""
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:

@@ -187,7 +187,7 @@ class _Maker:
             yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
-        """Yield, for each box, the rows that meet the condition, after the positions of these rows among all rows."""
+        """Yield, for each box, the positions of the rows that meet the condition among all rows, and these rows."""
         if whole and data.nbytes <= WHOLE:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
@@ -268,7 +268,7 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Yield the boxes of at most `most` points that make up a grid, in C order. Large boxes end where chunks end."""
+    """Divide a grid into boxes of at most `most` points, yielded in C order. Large boxes end where chunks end."""
     dims, inner = list(sizes), 1
     cut = len(dims)
     while cut and inner * sizes[dims[cut - 1]] <= most:

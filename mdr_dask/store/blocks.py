@@ -41,7 +41,7 @@ class Place:
     url: str
     series: str
     index: BlockIndex
-    # The slice of the arrays that the block fills, along each axis and then along ``realisation``.
+    # The part of the arrays that the block fills: one slice for each dimension, the last one for ``realisation``.
     region: tuple[slice, ...]
     # The `layout_mark` that the driver found in the store. A worker that finds another mark writes nothing.
     layout: str
@@ -57,7 +57,7 @@ def write_block(
 ) -> None:
     """Write a block: first the record, then one whole chunk of every output, and finally the chunk of the ledger.
 
-    Each array of `values` has the shape of the region, followed by the further dimensions of the output. `values` is
+    Each array in `values` has the dimensions of the region, then the further dimensions of its output. `values` is
     empty if only the ledger changes.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
@@ -111,14 +111,14 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Return the arrays of a group. The arrays are cached until the layout changes."""
     found, here = layout_mark(url), platform.node()
     if found != layout:
-        what = f"{here} finds another store at this path, or a later shape of it" if found else f"not seen from {here}"
+        what = f"{here} finds another store or layout at this path" if found else f"not seen from {here}"
         raise StoreError(f"{url}: {what}; the workers need a shared file system or a URL")
     return _opened(url, series, bytes_of(url))
 
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return arrays in memory like those of a group, without values, and the dict that receives encoded chunks."""
+    """Return empty copies of the arrays of a group in memory, and the dict that receives the encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory, empty = zarr.storage.MemoryStore(encoded), {}
     for name, array in shown.items():

@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 #: Name of the group at the root if the store also has series.
 ROOT = "-"
-#: Folder with claims. Claims replace locks on a server, and on a file system without locks.
+#: Folder with claims: the files that replace locks on a server, and on a file system without locks.
 CLAIMS = ".claims/"
 #: Folder with the record of the layout (`mdr_dask.store.integrity`).
 RECORD_FOLDER = ".layout"
@@ -206,13 +206,13 @@ def _write_local(url: str, root: Path, stages: Sequence[Mapping[str, bytes]]) ->
 
 def put(path: Path, content: bytes) -> None:
     """Write a new file."""
-    with open(path, "wb") as file:  # noqa: PTH123 (of many, Path.open takes longer)
+    with open(path, "wb") as file:  # noqa: PTH123 (Path.open is slower, and there are many files)
         file.write(content)
 
 
 def give_name(leftover: Path, target: Path) -> None:
     """Rename a complete temporary file to its final name, replacing an existing file."""
-    os.replace(leftover, target)  # noqa: PTH105 (of many)
+    os.replace(leftover, target)  # noqa: PTH105 (Path.replace is slower)
 
 
 def _make(folder: Path) -> list[Path]:
@@ -337,7 +337,7 @@ def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file."""
-    # a chunk ends with the CRC of its earlier bytes, so that a CRC would be the same for all chunks
+    # no CRC: a chunk ends with the CRC of its earlier bytes, and the CRC of all such files is the same
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 

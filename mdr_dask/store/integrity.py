@@ -9,7 +9,7 @@ from typing import Any
 
 from mdr_dask.store.files import RECORD_FOLDER, parsed, read_bytes, with_digest
 
-#: File with the record of the layout. Zarr reads this file as an empty group. Zarr would warn about any other file.
+#: File with the record of the layout. It describes an empty Zarr group, because Zarr warns about other files.
 RECORD = f"{RECORD_FOLDER}/zarr.json"
 #: Codecs of the arrays of a study. Other codecs might run code, and are refused.
 CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}

@@ -126,7 +126,7 @@ def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return those of the given names that the metadata of the study assign to chunks of coordinates."""
+    """Return those of the given file names that are chunks of coordinates, according to the metadata of the study."""
     members = root["consolidated_metadata"]["metadata"]
     groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
     data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
@@ -155,7 +155,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
     is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
     for name, content in read_many(url, record.files):
         if content is None:
-            if not is_older:  # an older ``zarr.json``: the run was stopped earlier
+            if not is_older:  # with an older ``zarr.json``, a run was stopped before it wrote all files
                 yield Finding("missing", name, "part of the layout; --repair or the next run writes it again")
         elif digest(content) not in record.files[name]:
             yield Finding("damaged", name, "not what was written")

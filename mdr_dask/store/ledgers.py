@@ -33,7 +33,7 @@ class Blocks:
     # `grid`: number of blocks along each dimension. `lengths`: length of a block along each dimension.
     grid: tuple[int, ...]
     lengths: tuple[int, ...]
-    # For each array, beginning with the ledger, the number of dimensions that the ledger lacks.
+    # Number of dimensions that each array has in addition to those of the ledger. The first array is the ledger.
     further: Mapping[str, int]
 
     @classmethod

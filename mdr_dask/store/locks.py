@@ -42,7 +42,7 @@ from mdr_dask.store.files import (
 
 try:
     import fcntl
-except ImportError:  # runs then make claims
+except ImportError:  # runs then create claims instead of locks
     fcntl = None  # type: ignore[assignment]
 
 #: `BEAT`: time in s between two heartbeats of a run with a claim. `SILENCE`: time in s without a heartbeat after
@@ -75,8 +75,8 @@ class Lock:
     owner: str
     # Number of the claim. None for a lock of the operating system.
     claim: int | None = None
-    # Whether an earlier run crashed or was killed while holding this lock. For the exclusive lock, while holding any
-    # lock.
+    # Whether an earlier run crashed or was killed while holding this lock. The exclusive lock also includes runs that
+    # held the lock of a part.
     after_crash: bool = False
 
 
@@ -430,7 +430,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim has recently written a heartbeat, or writes a heartbeat soon."""
+    """Return whether the owner of a claim has recently written a heartbeat, or writes one while this function waits."""
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _claim(name, number, "life")) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:

@@ -47,8 +47,8 @@ def is_damage(error: Exception) -> bool:
 def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
-    The values of numeric axes are in ascending order. The results of a study without series have the name ``""``, or
-    ``"-"`` if an earlier version has added series. Groups larger than `LAZY_BYTES` contain Dask arrays.
+    The values of numeric axes are in ascending order. The group of a study without series has the name ``""``. If an
+    earlier version has added series, its name is ``"-"``. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
     with readable(url):
         names = series_names(url)
@@ -74,7 +74,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             and not dataset.indexes[dim].is_monotonic_increasing
         ):
             dataset = dataset.sortby(dim)
-    # remove the coordinates that hold only the first value of a parameter inside a structured axis
+    # remove coordinates of parameters inside the values of an axis: they belong only to the first value of the axis
     inner = {"_".join(path) for axis in dataset.attrs["axes"] for path in entries_of(axis)}
     order = [*dataset.attrs["outputs"], "status"]
     return dataset[order].drop_vars(inner & dataset.coords.keys())
@@ -86,7 +86,7 @@ def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # no run extends a copy without this attribute
+        if value is not None and name != "mdr_dask_layout"  # without this attribute, no run extends the copy
     }
     return plain
 

@@ -223,8 +223,8 @@ def _faults(group: Group, block: BlockIndex, contents: Mapping[str, bytes | None
 def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> set[str]:
     """Return the digests that the chunk of an array may have. `status` is the digest of the chunk of the ledger.
 
-    The chunk may come from the last attempt that wrote the array before or together with the chunk of the ledger, or
-    from a later attempt that was killed before writing the ledger.
+    One attempt wrote this chunk of the ledger. The chunk of the array comes from the same attempt, or from an earlier
+    attempt if this one did not write the array, or from a later attempt that was killed before writing the ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()

@@ -71,7 +71,7 @@ REFUSED = [
     ("velocity + hurst > 1", "expected quantities of the same kind"),
     ("log(pressure) > 3", "expected a pure number in log"),
     ("velocty > 1", "no column 'velocty' (did you mean 'velocity'?)"),
-    ("velocity = 1", "; == compares"),
+    ("velocity = 1", "; write == to compare"),
     ("velocity > 3 foo", "; unknown unit 'foo'"),
     ("velocity and hurst", "expected a comparison such as 'hurst < 0.7'"),
     ("wear_rule > 3", "expected numbers, got 'wear_rule'"),
