@@ -25,7 +25,7 @@ def jit(function: Kernel) -> Kernel:
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that must not create arrays. Arrays in named tuples are read several times faster."""
+    """Compile a function that must not create arrays. It reads arrays in named tuples several times faster."""
     return _cached(function, UNCOUNTED)
 
 
@@ -59,7 +59,7 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _or_none(step: Callable[..., Any], done: str) -> Callable[..., Any]:
-    """Return a step of numba's cache that warns and returns None in place of an error."""
+    """Wrap a step of numba's cache: instead of raising an error, the step warns and returns None."""
 
     def tried(*arguments: Any) -> Any:
         try:

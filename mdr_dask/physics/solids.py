@@ -108,7 +108,7 @@ class SeriesFit:
     `storage_error` and `loss_error` are the root mean squares of the relative errors of G' and of G''. `storage_error`
     is NaN if the series was fitted to G'' alone. `largest_error` is the largest relative error of G' or G'', and occurs
     at the angular frequency `worst_frequency` in rad/s. `range` contains the lowest and the highest angular frequency
-    of the data.
+    of the fit.
     """
 
     solid: LinearSolid

@@ -233,7 +233,7 @@ class _Marched(_Group):
         before = self.problems.deborah[self.members]
         change = self.block.numbers("velocity_change")[self.members]
         after, loads = before * (1 + change), self.problems.loads[self.members]
-        first, which = combinations(before, after, loads)  # sorted by Deborah number, so that neighbours share work
+        first, which = combinations(before, after, loads)  # equal Deborah numbers are adjacent and share work
         return loads[first], np.column_stack([before, after])[first], which
 
 

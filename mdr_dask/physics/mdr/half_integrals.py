@@ -40,7 +40,7 @@ class Panels:
     `inner`: (1/pi) int_0^z u(z') / sqrt(z - z') dz'
     `full`: (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'
     `outer`: (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'
-    `slope`: u'(z), at the common end of two panels in the left panel
+    `slope`: u'(z); at the common end of two panels, the slope of u in the left panel
     `weights`: weights of the nodes in int_0^1 u dz
     """
 
@@ -84,7 +84,7 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
-    """Return the nodes on the polynomial of a panel: the nodes of the panel and the last node of the previous panel."""
+    """Return the indices of the nodes of a panel, preceded by the last node of the previous panel if there is one."""
     return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
 
 

@@ -106,8 +106,8 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`.
 
-    For r = low = 0, the integral diverges, and the result is 2. This is the integral of slope / x in the first cell,
-    divided by the mean slope, if the slope of the line load is proportional to x.
+    For r = low = 0, the integral diverges, and 2 is returned. If the slope of the line load is proportional to x, the
+    integral of slope / x over the first cell is 2 times the mean slope in this cell.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -20,7 +20,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is passed in one step
 TINY = 1e-290  # smaller displacements are set to 0
-CLOSE = 1e-8  # Newton's method ends after a step of less than this part of a cell; the next step would be rounding
+CLOSE = 1e-8  # Newton's method ends after a step below this part of a cell; the next step would be a rounding error
 ITERATIONS = 80
 
 # Indices of the `sums` of a sweep

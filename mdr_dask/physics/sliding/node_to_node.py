@@ -2,9 +2,9 @@
 
 The unit of length is the cell width, which is the distance between neighbouring nodes. The Deborah number De is the
 distance v tau divided by the cell width. Inside a cell, the penetration w (depth plus height) is a cubic. The places
-where contact begins and ends are computed approximately. The load is the integral of w in contact and of u out of
-contact. The drag is the integral of De w'^2 in contact and of u^2 / De out of contact. All integrands of the drag are
-positive, so that nothing cancels in slow sliding.
+where contact begins and ends are computed approximately. The load is the integral of w in contact, and of the
+displacement u out of contact. The drag is the integral of De w'^2 in contact and of u^2 / De out of contact. All
+integrands of the drag are positive, so that nothing cancels in slow sliding.
 
 If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms. In all
 other blocks, the solver follows one element from cell to cell. The results of a case do not depend on other cases in
@@ -38,7 +38,7 @@ SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highes
 # HEIGHTS and SQUARES are the integrals of the height and of the squared slope over a block.
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 # Rows of a tile (a part of a line on a finer grid). HEIGHT and SLOPE begin at the node before the tile.
-# MEAN, SQUARE and TOP are, in each cell, the integrals of the height and of the squared slope, and the largest height.
+# MEAN and SQUARE are the integrals of the height and of the squared slope over each cell. TOP is its largest height.
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
@@ -227,7 +227,7 @@ ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly 
 # State: displacement (U), derivative of U with respect to the depth (FADE), and CONTACT (1 in contact, 0 if free).
 # Sums: load, stiffness (RATE), drag (LOSS), length in contact, and integral of the squared slope in contact (STRETCH).
 # Constants: depth, De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and U at the start of the period (BEGAN).
-# CALM is 1 if the last block is entirely in contact or entirely free.
+# CALM is 1 if the current block is entirely in contact or entirely free.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH, DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(15)
 # Indices of the results of a case that are extrapolated over the last step of the depth
 DRAG, FRACTION, CONTACT_SLOPE = range(3)
@@ -303,8 +303,8 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
     """Return the place where a free element meets the line, and the fraction of u that remains at this place.
 
     At the start of the cell, the displacement of the element is u. `inverse` is 1 / De. At the place `last` the gap
-    between element and line is `gap_last` < 0. One Newton step improves the place at which a parabola through the gaps
-    at the start of the cell and at `last` crosses 0.
+    between element and line is `gap_last` < 0. The first guess of the place is the zero of a parabola through the gaps
+    at the start of the cell and at `last`. One Newton step improves this guess.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)

@@ -1,11 +1,11 @@
 """Steady sliding of a solid over a line, in dimensionless quantities. A case is a pair of speed and load.
 
-A Kelvin solid has no friction on a smooth plane. If `oversampling` is "auto", a closed
-form is also used for full contact of any solid with a rough plane. All other cases are solved by one of three modules:
+A Kelvin solid has no friction on a smooth plane. Full contact of any solid with a rough plane has a closed form, which
+is used if `oversampling` is "auto". All other cases are solved by one of three modules:
 
-* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane;
-* `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases in which `node_to_node` misses
-  the accuracy;
+* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane if `oversampling` is "auto";
+* `steady` (sweeps over cubic cells, or backward Euler) for all other cases of a Kelvin solid, and for cases in which
+  `node_to_node` misses the accuracy;
 * `viscoelastic` (sweeps over straight cells) for any other solid.
 """
 
@@ -77,8 +77,8 @@ def solve(
     """Return the steady states of a solid that slides over a line, and the errors of the results, shape (4, cases).
 
     Positions on the line are divided by the length of the line. For a Kelvin solid, `terms` is None. The Deborah number
-    is eta v / (G_inf L), where eta is the viscosity of the dashpot. For a Kelvin solid,
-    the Deborah number is equal to v tau / L. The load is F_N / (4 G_inf L), in the unit of height.
+    is eta v / (G_inf L), where eta is the viscosity of the dashpot. For a Kelvin solid, the Deborah number is equal to
+    v tau / L. The load is F_N / (4 G_inf L), in the unit of height.
 
     The errors are the absolute discretisation errors of `Steady.columns`, or infinite if the errors are not estimated.
     If a case misses the accuracy even on the finest grid, the results and errors on the finest grid are returned.
@@ -131,7 +131,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
     """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
-    # contact fraction and slope are computed at a rounded depth; if two grids round alike, the change seems to be zero
+    # contact fraction and slope are computed at a rounded depth; two grids with the same rounded depth hide this error
     unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -153,7 +153,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Store new results. A solution is kept unless the new result is accurate or has a smaller error of the drag."""
+    """Store new results. An old solution is kept unless the new one is accurate or has a smaller error of the drag."""
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]
@@ -190,7 +190,7 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
     solids = [prony(1.0, terms.moduli, terms.deborah, deborah[k]) for k in left]
     searches = [viscoelastic.ViscoelasticCase(solid, load) for solid, load in zip(solids, loads[left], strict=True)]
     line = line.from_summit()
-    # number of cells of the coarsest grid; results on a finer grid are extrapolated from this and the previous grid
+    # number of cells of the coarsest grid; results on every finer grid are extrapolated from the last two grids
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
 
     def solve(level: int, some: IntArray) -> Solution:

@@ -34,7 +34,7 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
 PATIENCE = 20  # after this number of sweeps, the search continues by bisection
-LOST = 1e-13  # rounding errors dominate if the rise in `_is_lost` is below this fraction of the depth
+LOST = 1e-13  # a rise of the line below this fraction of the heights is lost to rounding (see `_is_lost`)
 # A trail describes the depth as a function of the load near the last sweep.
 # Entries of a trail: log depth, log load, slope d(log depth) / d(log load), d(slope) / d(log load), Deborah number.
 TRAIL = 5

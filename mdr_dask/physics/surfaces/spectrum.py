@@ -35,9 +35,9 @@ class Spectrum:
             raise DataError(f"expected a spectrum of two points or more, got {q.size} and {density.size}")
         for what, numbers in (("wave numbers", q), ("spectral densities", density)):
             if not np.all(np.isfinite(numbers) & (numbers > 0)):
-                raise DataError(f"expected {what} of a spectrum above 0")
+                raise DataError(f"expected positive and finite {what} in a spectrum")
         if not np.all(np.diff(q) > 0):
-            raise DataError("expected strictly ascending wave numbers of a spectrum")
+            raise DataError("expected strictly ascending wave numbers in a spectrum")
 
     @cached_property
     def _logs(self) -> tuple[FloatArray, FloatArray]:

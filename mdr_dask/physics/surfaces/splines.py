@@ -20,7 +20,7 @@ Piece = tuple[float, float, float, float]
 
 
 def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return the coefficients of the least-squares spline of a sum of waves with at least two nodes per shortest wave.
+    """Return the coefficients of the least-squares spline of a sum of waves, with two or more nodes per shortest wave.
 
     `waves` contains half of the complex amplitude of every wave. Each amplitude is multiplied by a factor: the Fourier
     transform of the B-spline, divided by the sum of the squares of this transform over all aliases of the wave (Unser,

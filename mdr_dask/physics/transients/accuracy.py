@@ -3,8 +3,8 @@
 The steady states before and after a jump, and the drag just after the jump, are solved on finer and finer grids
 (:mod:`mdr_dask.physics.refine`). The march is computed on one grid only. From drag and depth in the march, the steady
 values on the same grid are subtracted, and the accurate steady values are added. A transient is therefore accurate even
-if the friction is much larger. The error of the transient is estimated by a second march with half as many nodes and
-half as many time steps.
+if it is much smaller than the friction. The error of the transient is estimated by a second march with half as many
+nodes and half as many time steps.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ from mdr_dask.physics.transients.patches import (
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of changes of contact in a cell, as a cubic force changes sign at most three times
-LEFT_LIMITS = -1  # outcome if a patch extends beyond a run of cells, or there are too many patches
+LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch leaves a run of cells, or a work array is full
 
 # Entries of `Workspace.scan`, the state of the search
 (
@@ -137,7 +137,7 @@ class Search(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Cell i of the line. `line` contains the coefficients of the cubic that is the height of the line in this cell.
+    """Cell i of the line. `line` contains the coefficients of the cubic height of the line in this cell.
 
     `stop` is the end of the cell, or the end of the period if the period ends in this cell. `pressed` is True if the
     force on elements in contact would be positive everywhere in the cell. `weak` is True if this force may have been
@@ -275,9 +275,9 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 def _skip_free(search: Search, i: int, stop: int) -> int:
     """Return the first cell from i to `stop` in which contact may begin.
 
-    A cell is skipped if the gap between free elements and line is too wide to have opened since the elements separated.
-    The gap is computed from a lower bound of the displacement. This bound begins with the last known displacement and
-    decays towards the least drift.
+    A cell is skipped if the gap between free elements and line is so wide that the line cannot have met these elements
+    since they separated. The gap is computed from a lower bound of the displacement. This bound begins with the last
+    known displacement and decays towards the least drift.
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, lift = now.track, work.recovery.bounds, search.lift
@@ -415,7 +415,7 @@ def _lowest_beyond(search: Search, u: float) -> float:
 
 @jit_inline_uncounted
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
-    """Return True and the place where contact begins beyond x in a cell, or False and the place to continue the search.
+    """Return True and the place where contact begins beyond x in a cell, or False and where to continue the search.
 
     Contact can begin only between `low`, where the force becomes positive, and `high`, where the force falls to zero
     again. If contact does not begin, `high` is stored as a place of separation, because elements may have separated

@@ -27,7 +27,7 @@ from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Pa
 
 STRIDE = 2.0  # longest step towards a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
-# WINDOW: cells that the line travels in the shortest window; WINDOWS: number of windows, each twice the one before
+# There are WINDOWS windows of time. In the shortest, the line travels WINDOW cells; each next window is twice as long.
 WINDOW, WINDOWS = 8.0, 16
 
 
@@ -88,7 +88,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     left, back = np.exp(-time), last
     shallowest, deepest, least_lift = depth, depth, depth + rate
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
-    if first.deborah > deborah:  # drift of elements that have been free since before the jump: u (1 - D / D_1)
+    if first.deborah > deborah:  # drift of elements free since before the jump, when D was D_1: u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
     # passed earlier. `opened` includes this increase from the start of the window until half a window after the jump.

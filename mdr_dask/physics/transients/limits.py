@@ -120,7 +120,7 @@ def steady_limits(
         fast = float(deborah[k, 1] * n)
         at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
         slower, outcome = both[int(np.argmin(deborah[k]))], Outcome(end)
-        is_full = both[0].start.size == both[1].start.size == 1  # a second patch follows free elements
+        is_full = both[0].start.size == both[1].start.size == 1  # free elements would be followed by a second patch
         found.append(
             SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], is_full, outcome)
         )

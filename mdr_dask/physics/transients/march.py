@@ -79,7 +79,7 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], work: Workspace
 ) -> tuple[int, float, float]:
-    """Find the depth that carries the load at the last instant of the history by Newton's method.
+    """Find, by Newton's method, the depth that carries the load at the last instant of the history.
 
     Return the outcome (or `LEFT_LIMITS`), the drag, and the derivative of the drag with respect to t / tau.
     """

@@ -133,9 +133,9 @@ def march(
 ) -> tuple[Marching, Trajectory, Workspace, Outcome]:
     """Return the march from the steady state before the jump to the steady state after it, and the outcome.
 
-    In the march, lengths are in cells, and the load is F_N / (4 G dx).
-    The depth may leave the interval between the two steady depths by a margin, which is the length of the interval. If
-    this margin is not sufficient, the march is repeated with 4 times and then with 16 times the margin.
+    In the march, lengths are in cells, and the load is F_N / (4 G dx). The depth may leave the interval between the two
+    steady depths by a margin, which is as large as the interval. If this margin is not sufficient, the march is
+    repeated with 4 times and then with 16 times the margin.
     """
     cells = line.track.cells
     load, deborah = load * cells, deborah * cells

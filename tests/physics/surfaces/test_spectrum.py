@@ -102,8 +102,8 @@ def test_errors_of_a_single_scan_hold_above_and_below_the_rolloff():
     ("q", "density", "message"),
     [
         ([1.0], [1.0], "two points or more"),
-        ([1.0, 2.0], [1.0, 0.0], "spectral densities of a spectrum above 0"),
-        ([1.0, np.nan], [1.0, 1.0], "wave numbers of a spectrum above 0"),
+        ([1.0, 2.0], [1.0, 0.0], "positive and finite spectral densities"),
+        ([1.0, np.nan], [1.0, 1.0], "positive and finite wave numbers"),
         ([1.0, 1.0], [1.0, 1.0], "expected strictly ascending wave numbers"),
     ],
 )

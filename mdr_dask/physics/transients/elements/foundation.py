@@ -1,7 +1,7 @@
 """Motion of one element of a viscoelastic foundation: at constant speed in contact, or in free recovery.
 
-In all functions, `terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and
-i is the index of one element. Functions take the index, because slicing an array would take longer. The static modulus
+In all functions, `terms` contains the strains of the dashpots of the Prony terms, with one row for each element, and i
+is the index of one element. Functions take the index, because slicing an array would take longer. The static modulus
 is 1, and the line has the length 1.
 """
 

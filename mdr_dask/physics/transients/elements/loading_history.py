@@ -58,8 +58,8 @@ def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float
     """Return the state of the elements at the nodes in steady sliding, the depth, and the outcome.
 
     One element is moved along the line in steps of half a cell, by the method of :func:`follow_line`, until the state
-    of the element repeats. The load that belongs to a depth is computed from the mean displacement. The depth is the
-    root for the given load. At ``deborah = 0`` the elements are in equilibrium at rest under the load.
+    of the element repeats. The load that belongs to a depth is computed from the mean displacement. The depth is
+    varied until this load is the given load. At ``deborah = 0`` the elements are in equilibrium at rest under the load.
     """
     n, terms = line.height.size - 1, solid.times.size
     state = untouched(n, terms)

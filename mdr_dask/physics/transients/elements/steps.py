@@ -308,7 +308,7 @@ class Schedule(NamedTuple):
 
 
 class StepWorkspace(NamedTuple):
-    """Work arrays of one time step, shape (n,) each, except `after_terms` with the shape (n, terms).
+    """Work arrays of one time step, with one entry per element. `after_terms` has one row per element.
 
     `under` and `slope` are height and slope of the line at the end of the time step. `old_under` and `old_slope` are
     height and slope at the start. `after` is the displacement without contact at the end of the time step. `parts` and
