@@ -121,7 +121,7 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the approximate operations of a block, counted for the same cases in the first realisations."""
+        """Return the approximate operations of a block, from a count for its cases and the first realisations."""
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
         first, known = (*cases, 0), self._known

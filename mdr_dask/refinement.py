@@ -249,10 +249,10 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
     """Return the interpolation error of each interval, shape (lines, values - 1).
 
-    If the end of an interval that was added later has level n, the output in the interval is predicted from all values
-    of lower levels, once by a monotone cubic and once by a cubic spline. The error is the largest difference between
-    the predictions and the monotone cubic through all values, minus an allowance for the scatter of the realisations
-    and the discretisation errors. The result may be negative.
+    Let n be the higher of the levels at the two ends of an interval. The output in the interval is predicted from all
+    values of lower levels, once by a monotone cubic and once by a cubic spline. The error is the largest difference
+    between the predictions and the monotone cubic through all values, minus an allowance for the scatter of the
+    realisations and the discretisation errors. The result may be negative.
 
     `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
     middle, 2 at the quarters, ... `groups` contains the means described in `Mean.groups`, in an array with three axes:

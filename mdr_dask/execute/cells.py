@@ -73,7 +73,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield an array for each group. The array holds the part (1 to `count`) that computes each result."""
+    """Yield an array for each group. For each result, it holds the number of the part (1 to `count`)."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)

@@ -47,7 +47,7 @@ def run(
     the blocks of this part are computed and counted. Other parts may run at the same time.
     """
     models.require_current(campaign.model)
-    stored_layout(Stage.first(campaign), url)  # an error raised here leaves nothing locked
+    stored_layout(Stage.first(campaign), url)  # an error is raised here, before anything is locked
     url = store.absolute(url)  # a model may change the working directory later
     with Executor(resources, campaign.model, tell) as execute:
         if not store.exists(url):
@@ -151,7 +151,7 @@ class _Run:
         return current.realisations[0]
 
     def plan_round(self, stage: Stage, last: _Round | None) -> _Round:
-        """Return the next round, and extend the store if a case needs more realisations; other parts wait meanwhile."""
+        """Return the next round, and lay out the store for it if a case needs it; other parts wait meanwhile."""
         replication = stage.campaign.replication
         with store.gate(self.url):
             layout, places = stored_layout(stage, self.url)

@@ -24,8 +24,8 @@ BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
 #: Cells are left out if ln(density) is below its maximum by more than this value. The total probability of these cells
 #: is below 1e-5.
 REACH = 14.0
-#: Refinement ends when ln(density) varies within the divided cells by less than this value, on average over all cells
-#: weighted with their density.
+#: Refinement ends when the variation of ln(density) within a divided cell is less than this value, as a mean over the
+#: divided cells with their probabilities as weights.
 SMOOTH = 0.6
 #: Largest number of refinements.
 REFINEMENTS = 16
@@ -113,6 +113,7 @@ class Posterior(NamedTuple):
 
     `places` are the centres of the cells, and `weights` are the probabilities of the cells. `density` is the logarithm
     of the density up to a constant. `noise` is the probability of each size of the measurement error in each cell.
+    `width` is the length of the edges of a cell.
     """
 
     places: FloatArray
@@ -204,7 +205,7 @@ class Product(NamedTuple):
 
 
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
-    """Return products of powers of the undetermined unknowns `free` that the data determine.
+    """Return the products of powers of undetermined unknowns, `free`, if the data determine these products.
 
     `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns).
     """
