@@ -48,7 +48,7 @@ _VARIATION = """\
 
 | written | means |
 |---|---|
-| `[1 N, 3 N, 10 N]` | these values; also inside a structure |
+| `[1 N, 3 N, 10 N]` | these values, also for an entry of a structure such as `indenter` |
 | `[[1 ms], [1 ms, 1 s]]` | two values of a parameter that is itself a list; the store names them as they are written |
 | `{values: [...]}` | the same as a list |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |

@@ -193,7 +193,7 @@ def _requested(
     groups: Mapping[str, xr.Dataset],
     axes: Mapping[str, Any],
 ) -> dict[str, Plot]:
-    """Return the requested figures by name. The default name of the file of a figure ends with this name."""
+    """Return the requested figures by name. By default, this name is the last part of the file name of a figure."""
     given = [option for option in OF_OUTPUTS if axes[option]]
     if everything:
         if names or given:

@@ -53,7 +53,7 @@ def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
     for entry in packed.infolist():
         if entry.file_size > max(SMALL, LARGEST_RATIO * entry.compress_size):
             size = f"{entry.compress_size} bytes that unpack to {entry.file_size}"
-            raise StoreError(f"{path}: {entry.filename!r:.80} has {size}: no zip of 'mdr-dask publish'")
+            raise StoreError(f"{path}: {entry.filename!r:.80} has {size}: not written by 'mdr-dask publish'")
     if CHECKSUMS not in packed.namelist():
         raise StoreError(f"{path}: a zip without {CHECKSUMS}, expected one that 'mdr-dask publish' wrote")
     lines = packed.read(CHECKSUMS).decode("utf-8", "replace").splitlines()
