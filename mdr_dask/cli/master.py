@@ -50,7 +50,7 @@ PARTS = ("factors", "curve", "points")
     help="Value of --by at which the factors are zero, in the unit of --by. It may lie between the measured values.",
 )
 @click.option(
-    "--output", "-o", type=click.Path(path_type=Path), help="Write the table to FILE.csv, such as shift factors."
+    "--output", "-o", type=click.Path(path_type=Path), help="Write the table that --show selects to FILE.csv."
 )
 @figure_options("--plot")
 @click.option("--show", "part", type=click.Choice(PARTS), default=PARTS[0], show_default=True, help="What to print.")

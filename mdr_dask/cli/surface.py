@@ -35,7 +35,7 @@ KINDS = ("map", "scan", "spectrum")
 @click.option(
     "--outliers", type=click.Choice(("keep", "fill")), help="Keep or replace points far from their neighbours.  [keep]"
 )
-@click.option("--direction", type=click.Choice(("x", "y")), help="Sliding direction over an anisotropic map.")
+@click.option("--direction", type=click.Choice(("x", "y")), help="Sliding direction on an anisotropic surface.")
 @click.option("--longest-wavelength", help="Leave out longer wavelengths.")
 @click.option("--shortest-wavelength", help="Leave out shorter wavelengths.  [those that contain only noise]")
 @click.option("--spectrum", "-o", type=click.Path(path_type=Path), help="Write C2D to FILE.csv, for a campaign.")

@@ -39,7 +39,7 @@ FIGURES: dict[str, dict[str, tuple[str, *tuple[View, ...]]]] = {
             View("breakthrough_probability", "temperature", log=""),
         ),
         "profiles": (
-            "the two surfaces in the contact where contact is greatest",
+            "profiles of the two rollers at the angle with the longest intimate contact",
             View(("upper_profile", "lower_profile"), "position", single=True),
         ),
         "trace": (

@@ -255,7 +255,7 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
 
 
 def _title(figure: Drawn, description: Figure) -> float:
-    """Write the title and return the height in inches. If a size is requested, write only a title from the user."""
+    """Write the title and return its height in inches. If a size is requested, write only a title from the user."""
     asked = page.current()
     if asked.title is not None or asked.width is not None:
         lines = [asked.title] if asked.title else []
@@ -341,7 +341,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn) -> None:
-    """Break long labels, and remove overlapping ticks. Both steps change the size of axes, and are repeated."""
+    """Break long labels, and remove overlapping ticks. Repeat both steps, because they change the size of axes."""
     for _ in range(4):
         figure.draw_without_rendering()
         changed = False

@@ -40,9 +40,9 @@ class View:
     `over` is the parameter on the horizontal axis. With two parameters, the figure is a map. Colours show the values of
     the parameter `by`. There is one panel for each value of the parameter `panels`. `log` contains the letters of the
     logarithmic axes (x, y, and z for colours). If `log` is None, an axis is logarithmic if the numbers are positive and
-    span more than a factor of ten. An output that is a pure number then has a linear axis. For an output against its
-    own dimension, such as a profile, both axes are then linear. If `single` is true, the first realisation is drawn
-    instead of the mean. `guides` contains the positions and names of horizontal lines for each output.
+    span more than a factor of ten, with two exceptions: the vertical axis of an output that is a pure number is linear,
+    and both axes are linear for an output against its own dimension, such as a profile. If `single` is true, the first
+    realisation is drawn instead of the mean. `guides` contains positions and names of horizontal lines for each output.
     """
 
     outputs: str | tuple[str, ...]

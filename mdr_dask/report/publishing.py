@@ -56,8 +56,8 @@ def publish(url: str, target: Path) -> int:
 
 
 def _campaign(url: str, text: str) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that the campaign names. The returned name of a file outside the folder of the
-    campaign has no folder. The returned campaign contains this name.
+    """Return the text of the campaign, and the contents of the files that it names, indexed by name. For a file outside
+    the folder of the campaign, folders are removed from the name, also in the text of the campaign.
     """
     found = {}
     for file in _named_files(url):

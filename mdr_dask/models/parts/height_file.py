@@ -62,8 +62,8 @@ def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]
     """Return the map in a file, and remarks on how the file was read.
 
     The file is a text, an npy file, or a file that SurfaceTopography can read. Each row of a text or npy file contains
-    the heights along x at one y. In the map, missing points are NaN. `units` are the units and spacings that the user
-    states.
+    the heights along x at one y. A row of a text may instead contain x, y and z of a point. In the map, missing points
+    are NaN. `units` are the units and spacings that the user states.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -396,7 +396,7 @@ COORDINATES = (
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
     """Return an index and a unit for each of the columns x, y and z. Return () if one of these columns is missing.
 
-    If the columns have no names, x, y and z are the three columns that do not hold row numbers.
+    If the columns have no names, x, y and z are the only three columns that do not hold row numbers.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)

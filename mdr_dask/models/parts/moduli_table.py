@@ -23,7 +23,7 @@ from mdr_dask.units import shown
 #: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
-#: Columns that determine storage and loss modulus.
+#: Pairs of columns. Each pair determines storage and loss modulus.
 WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
 SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this value count as equal
 
@@ -207,7 +207,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
     text = f", log10 a_T (95 %) {ends}"
     if found.undetermined:
         runs = " and ".join(f"{shown(a, 'K')} to {shown(b, 'K')}" for a, b in found.undetermined)
-        text += f"; shift factors are not determined from {runs}: give wlf, arrhenius or shift_factors instead"
+        text += f"; shift factors are not determined in the range {runs}: give wlf, arrhenius or shift_factors instead"
     return found.horizontal, found.vertical, text
 
 

@@ -1,4 +1,4 @@
-"""The four kinds of rough lines: generated, with the spectrum of a surface, measured, and smooth.
+"""The four kinds of lines: generated lines, lines with the spectrum of a surface, measured lines, and smooth lines.
 
 Heights are divided by the rms height of the line. Positions are divided by the length of the line.
 """

@@ -298,7 +298,7 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
             remarks = (*remarks, f"missing points filled: {missing}")
         far = outliers(surface)
         count = int(np.count_nonzero(far))
-        if count > MOST_MISSING * far.size:  # points of the surface, and too many to be replaced
+        if count > MOST_MISSING * far.size:  # so many points are part of the surface and are kept
             share = 100 * count / far.size
             remarks = (*remarks, f"{share:.2g} % of the points are far from their neighbours, too many to be outliers")
         elif count and maps.outliers == "fill":

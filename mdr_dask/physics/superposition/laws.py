@@ -45,9 +45,9 @@ class ShiftLaw:
 
 
 def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, anchor: int) -> ShiftLaw:
-    """Fit ``factor = exponent log10(group / anchor)``; `anchor` is the index of the group whose factor is zero.
+    """Fit ``factor = exponent log10(group / groups[anchor])`` to factors in decades.
 
-    The groups must be positive.
+    The groups must be positive. `anchor` is the index of the group whose factor is zero.
     """
     return _one_constant("power", "exponent", lambda at: np.log10(at / groups[anchor]), groups, factors, covariance)
 

@@ -28,7 +28,7 @@ FREE = (0.03, 1.5)
 """Prior of the standard deviation of the steps of free vertical factors, in the form of `OFFSET`."""
 
 DETERMINED = 0.5
-"""The curves do not determine a step whose standard deviation exceeds this fraction of the prior value."""
+"""A step between neighbouring shifts is undetermined if its standard deviation exceeds this times `STEP_SCATTER`."""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 
@@ -39,13 +39,14 @@ class Superposition:
 
     Parameters
     ----------
-    groups : array, shape (groups,)
+    groups : array, shape (curves,)
         Ascending values of the quantity, such as velocity or temperature, that differs from curve to curve.
-    horizontal, vertical : array, shape (groups,)
+    horizontal, vertical : array, shape (curves,)
         Shift factors: for each curve, the decades added to log10 x and to log10 y. At the reference the factors are
         zero.
-    draws : array, shape (draws, 2 groups)
-        Draws of horizontal and vertical factors from their probability density.
+    draws : array
+        Draws of the factors from their probability density. Each row is one draw: the horizontal factors of all
+        curves, then the vertical factors.
     reference : float
         Group, or value between two groups, at which the factors are zero.
     noise : array, shape (channels,)
@@ -60,8 +61,8 @@ class Superposition:
         Abscissae of the merged curves.
     curve_y, curve_error : array, shape (channels, curve points)
         The merged curves and their standard errors, at the reference.
-    curve_cross : array, shape (channels, curve points, 2 groups)
-        Covariance of the merged curves and the factors.
+    curve_cross : array
+        Covariance of the merged curves and the factors. The axes are channel, curve point and factor.
     measured : tuple of float
         Range of log10 x of the points measured at the reference. Outside this range the merged curve depends on the
         shift factors, because only shifted points determine the curve there.
@@ -102,7 +103,7 @@ class Superposition:
         return np.asarray(self.draws[:, self.groups.size :].std(axis=0), dtype=np.float64)
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
-        """Return the ends of the confidence intervals of all factors, shape (2, 2 groups)."""
+        """Return the confidence intervals of all factors: a row with the lower ends and a row with the upper ends."""
         ends = (0.5 - confidence / 2, 0.5 + confidence / 2)
         return np.asarray(np.quantile(self.draws, ends, axis=0), dtype=np.float64)
 
@@ -123,7 +124,7 @@ def superpose(
 
     Parameters
     ----------
-    groups : array_like, shape (groups,)
+    groups : array_like, shape (curves,)
         One distinct value for each curve: the quantity that differs from curve to curve.
     curves : sequence of (x, y)
         log10 of abscissa and ordinate of each curve. A curve must have at least two points. The array x has the shape
@@ -140,7 +141,7 @@ def superpose(
         group.
     seed : int
         Seed of the draws.
-    kelvin : array_like, shape (groups,), optional
+    kelvin : array_like, shape (curves,), optional
         Absolute temperatures of the groups, for b_T. None means that the groups are absolute temperatures.
 
     Raises
@@ -262,7 +263,7 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return, for each row of shifts, which curves are separated from all earlier curves by a gap in the abscissa."""
+    """Return, for each row of shifts, a mask of the curves that begin beyond the ends of all curves to their left."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)
@@ -291,7 +292,7 @@ def rereference(
     ----------
     reference : float
         New reference, between the lowest and the highest group.
-    law : array, shape (groups,), optional
+    law : array, shape (curves,), optional
         Factors of the groups according to a law of the shifts. Without a law, the measured factors are interpolated.
     at_reference : float
         The factor of the law at the reference.
@@ -311,7 +312,7 @@ def rereference(
     known = np.zeros(size) if law is None or reference in groups else law - at_reference
     both = np.kron(np.eye(2), share)
     across, along = float(share @ (result.horizontal - known)), float(share @ result.vertical)
-    zero = both @ result.draws.T  # factors at the new reference in each draw, shape (2, draws)
+    zero = both @ result.draws.T  # both factors at the new reference in each draw, shape (2, draws)
     zero[0] -= share @ known
     bend = interpolation_error(places, result.horizontal - known, float(place))
     zero[0] += bend * ndtri((np.random.default_rng(0).permutation(zero.shape[1]) + 0.5) / zero.shape[1])

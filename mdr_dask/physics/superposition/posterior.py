@@ -30,19 +30,20 @@ CELLS = 8
 """Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
 
 MARGIN = 0.5
-"""Distance by which the spline extends on each side beyond the curves after the first shift, in widths of a curve."""
+"""Distance by which the spline extends on each side beyond the curves at their most probable shifts, in widths."""
 
 ROUNDING = 1e-5
 """Smallest scatter of a curve, decades: the rounding of a table with five digits."""
 
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
-"""Prior standard deviations of the mean step between neighbouring curves, and of each step about it, in widths."""
+"""Prior standard deviations, in widths of a curve: of the mean step of the shifts, and of a step about this mean."""
 
 BEND, BEND_SCATTER, BEND_DRIFT = 0.02, 3.0, 1.0
 """Prior of the bend near each curve: the standard deviation of the second differences of the spline.
 
-The numbers are its median, in heights of a curve, and the standard deviations of its logarithm and of the change of
-this logarithm from one curve to the next. The bend varies, because a master curve is bent in some places only.
+`BEND` is its median in heights of a curve, `BEND_SCATTER` the standard deviation of its logarithm, and `BEND_DRIFT` the
+standard deviation of the change of this logarithm from one curve to the next. The bend varies, because a master curve
+is bent in some places only.
 """
 
 REACH = 0.3
@@ -52,7 +53,7 @@ NOISE, NOISE_SCATTER = 0.01, 2.0
 """Prior of the relative scatter of each channel: median, and standard deviation of the logarithm of the scatter."""
 
 TREND = 10.0
-"""Ratio of two prior standard deviations of drifting offsets: of the mean step, and of steps about the mean step."""
+"""Prior standard deviation of the mean step of drifting offsets, divided by that of the deviations from this mean."""
 
 FARTHEST = 8.0
 """Largest distance of the logarithm of a scale from its prior median. This limit prevents overflow."""
@@ -87,7 +88,7 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return the abscissa at which the spline of each row begins; the spline is centred on the shifted points."""
+        """Return where the spline begins for each row of `moved`, the shifted points on which the spline is centred."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
@@ -190,7 +191,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     bend = near @ share.swapaxes(1, 2)
     weight = 1 / (noise**2 + ROUNDING**2)
 
-    # the data of a channel are its points, and the second differences of its coefficients, which are zero
+    # the data of a channel are its points, and a zero for each second difference of its spline coefficients
     bent = np.array([[1.0, -2.0, 1.0, 0.0]] * (splines - 3) + [[0.0, 1.0, -2.0, 1.0]])
     first = np.hstack([first, np.tile(np.minimum(np.arange(splines - 2), splines - ORDER), (many, 1))])
     value = np.concatenate([value, np.tile(bent, (many, 1, 1))], axis=1)[:, None]
@@ -216,10 +217,10 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
         corner = tied + np.sum(weight, axis=1)[:, None, None] * np.diag(np.bincount(curves.member))
     try:
         factor = cholesky_banded(band[::-1], check_finite=False)
-    except LinAlgError:  # of a chain that diverges; a row has 7 entries, each with up to 5 rounding errors of eps / 2
+    except LinAlgError:  # a chain diverges; 7 entries of a row, with 5 rounding errors of eps / 2 each: below 20 eps
         band[0] *= 1 + 20 * np.finfo(np.float64).eps
         factor = cholesky_banded(band[::-1], check_finite=False)
-    half = dtbtrs(factor, sides, trans="T")[0]  # U^-T B; B^T A^-1 B loses fewer digits as the square of this matrix
+    half = dtbtrs(factor, sides, trans="T")[0]  # M = U^-T B; computed as M^T M, B^T A^-1 B loses fewer digits
     half, solved = (each.reshape(many, channels * splines, 1 + offsets) for each in (half, dtbtrs(factor, half)[0]))
     alone, gain, border = solved[..., :1], solved[..., 1:], half[..., 1:].swapaxes(1, 2)
     corner = corner - border @ half[..., 1:]
@@ -233,7 +234,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     for d in range(ORDER):
         within[d, :, d:] += np.vecdot(cross[:, d:], gain[:, : gain.shape[1] - d])
 
-    # residual of each datum and its variance; at each point, slope of the curve, and covariance of slope and residual
+    # for each datum: residual and its variance; for each point: slope of the curve, covariance of slope and residual
     own, slope, inner = np.take(mean, at), slope[:, None], slice(points)
     left, steep = target - np.vecdot(value, own), np.vecdot(slope, own[:, :, inner])
     variance, tilt = np.zeros_like(left), np.zeros_like(steep)
@@ -257,7 +258,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     energy += 0.5 * np.sum(pull * away, axis=1)
     by_scale = 1 - precision * (
         left**2 + variance
-    )  # derivative by the logarithm of the standard deviation of each datum
+    )  # derivative with respect to the logarithm of the standard deviation of each datum
     by_bend, lever = by_scale[..., points:], share * apart / REACH**2
     turn = np.sum(weight[..., None] * (tilt - left[:, :, inner] * steep), axis=1)
     by_shift = CELLS * turn @ np.eye(count)[curves.member]
@@ -288,7 +289,7 @@ def _inverse_band(factor: FloatArray) -> FloatArray:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the first of the four splines at each position (in cells), and values and slopes of all four splines."""
+    """Return the index of the first of four splines at each position (in cells), and values and slopes of all four."""
     first = np.clip(np.floor(place), 0, splines - ORDER).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     powers = np.vander(inside.ravel(), ORDER, increasing=True).reshape(*inside.shape, ORDER)

@@ -67,7 +67,7 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
 
 @np.errstate(over="ignore", invalid="ignore")  # moves that diverge are rejected
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
-    """Return the curves with the number of spline coefficients used, and draws, shape (draws, parameters)."""
+    """Return the curves, with `splines` set to the number that was used, and a row of parameters for each draw."""
     shifts = first_guess(curves)
     curves = laid_out(curves, shifts)
     start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
