@@ -44,8 +44,8 @@ class Solution(NamedTuple):
 
     `values` contains one array per output, with one number or one profile per case. NaN in a profile marks positions
     where the output does not exist. `outcome` contains one value of `Outcome` per case. `unseen`, a number or an array
-    of shape (outputs, cases), is a relative error that may be missing in the difference between the results on two
-    grids.
+    of shape (outputs, cases), is a relative error that may be equal on two grids, and is then missing in the difference
+    between the results on these grids.
     """
 
     values: Sequence[FloatArray] | FloatArray

@@ -136,7 +136,7 @@ def power_law_series(
 
     `loss_modulus` is G'' in Pa at the angular frequency `frequency` in rad/s. The series follows the law at angular
     frequencies from `lowest` to `highest`. The reciprocals of the relaxation times extend one decade beyond both ends
-    of this range. With two terms per decade, the error of G'' in the range is below 1 %.
+    of this range. The series has about two terms per decade, and the error of G'' in the range is below 1 %.
     """
     if not 0 < exponent < 1:
         raise ValueError(f"the exponent of a power-law spectrum must lie between 0 and 1, got {exponent!r}")

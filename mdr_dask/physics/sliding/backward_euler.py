@@ -5,7 +5,7 @@ time step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body
 nodes. As u is periodic, the forces are sums over the nodes:
 
     F_N / (4 G dx) = sum of u_i
-    F_x / (4 G) = sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1))
+    F_x / (4 G) = sum of (w_i - w_(i-1)) (u_i - lambda u_(i-1)) / (1 - lambda)
 
 Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In all other blocks, one vector
 instruction treats several cases.

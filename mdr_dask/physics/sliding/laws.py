@@ -21,7 +21,7 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19).
+    """Return v tau slope / (sqrt(2) h) (eq. 3.19).
 
     If this number is about 1, only the fronts of the asperities are in contact.
     """
@@ -39,11 +39,11 @@ def full_contact(force: Any, velocity: Any) -> Any:
 
 
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
-    """Return mu / (sqrt 2 slope) for all velocities and forces (eq. 3.17, 3.18).
+    """Return mu / (sqrt(2) slope) for all velocities and forces (eq. 3.17, 3.18).
 
     The arguments are `force_number`, `velocity_number`, and the constants alpha and beta of eq. 3.11. Three laws are
-    combined by 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 = sqrt 2 slope is the plateau, mu_2 follows
-    from `full_contact`, and mu_3 = sqrt 2 slope beta velocity force^-alpha is the law at low velocity and low force.
+    combined by 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 = sqrt(2) slope is the plateau, mu_2 follows
+    from `full_contact`, and mu_3 = sqrt(2) slope beta velocity force^-alpha is the law at low velocity and low force.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 
@@ -61,8 +61,8 @@ def indenter_low(
 
 
 def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
-    """Return mu / (sqrt 2 slope) of a rough indenter (eq. 3.40, 3.43).
+    """Return mu / (sqrt(2) slope) of a rough indenter (eq. 3.40, 3.43).
 
-    The argument `xi` is mu / (sqrt 2 slope) with mu from `indenter_low`.
+    The argument `xi` is mu / (sqrt(2) slope) with mu from `indenter_low`.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)

@@ -168,7 +168,7 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return the weights that interpolate a line to a finer grid, shape (2, refinement, 4 WING).
+    """Return the weights that interpolate a line to a finer grid, shape (2, refinement, 4 * WING).
 
     The first index is 0 for the interpolated height and 1 for the slope. The second index numbers the finer nodes
     inside a cell. The third index runs over the heights at the `WING` nodes on each side of the cell, and then over the

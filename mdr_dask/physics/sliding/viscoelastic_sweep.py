@@ -1,9 +1,9 @@
 """Exact sweep of a linear viscoelastic foundation along a line of straight cells.
 
 The unit of length is the cell width, and stresses are divided by the static modulus. The stretch e_m of the spring in
-Prony term m obeys de_m/ds = du/ds - e_m / deborah_m, where s is the travelled distance, and deborah_m is the distance
-tau_m v. In contact, u is the penetration w, and the stretches have closed forms. The displacement of a free element is
-a sum of exponential modes.
+Prony term m obeys de_m/ds = du/ds - e_m / deborah_m, where u is the displacement, s is the travelled distance, and
+deborah_m is the distance tau_m v. In contact, u is the penetration w, and the stretches have closed forms. The
+displacement of a free element is a sum of exponential modes.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of th
 class SurfaceMap(NamedTuple):
     """Heights on a regular grid, m, positive towards the elastomer; NaN for missing points.
 
-    `size` contains the lengths along x and y, m: number of points times spacing.
+    `size` contains the lengths along x and y in m. A length is the number of points times the spacing.
     """
 
     height: FloatArray
@@ -44,7 +44,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
     across = np.abs(middle - 0.5 * (height[1:-1, 2:] + height[1:-1, :-2]))
-    away = np.minimum(along, across)  # a point on a crest is far from its neighbours across the crest
+    away = np.minimum(along, across)  # a point on a crest is far from its neighbours across the crest, but not along it
     limit = FAR * 1.4826 * float(np.nanmedian(away[:: 1 + away.shape[0] // 1000, :: 1 + away.shape[1] // 1000]))
     found = np.zeros(height.shape, bool)
     if not limit > 0:
@@ -125,7 +125,7 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
     """Return the Hann window as a function of the distance from the centre.
 
-    The mean square of the window is 1. Beyond half the shorter side of the map, the window is 0.
+    The mean square of the window is 1. At distances above half the shorter side of the map, the window is 0.
     """
     x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)

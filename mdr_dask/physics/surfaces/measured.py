@@ -20,7 +20,7 @@ UNEVEN = 1e-3
 
 @dataclass(frozen=True)
 class MeasuredLine:
-    """One period of a line at equidistant points: heights, positive towards the elastomer, and length, m."""
+    """One period of a line: heights at equidistant points (positive towards the elastomer) and length, both in m."""
 
     height: FloatArray
     length: float
@@ -39,7 +39,7 @@ def measured_line(
     shortest: float = 0.0,
     longest: float = 0.0,
 ) -> MeasuredLine:
-    """Turn positions and heights of a recorded line, m, into one period of a line with uniform spacing.
+    """Turn positions and heights (in m) of a recorded line into one period of a line with uniform spacing.
 
     The length of the period is the number of points times the mean spacing. At both ends, a cosine window reduces the
     heights towards their mean. `taper` is the fraction of the line that the window changes: 0.1 means 5 % of the line

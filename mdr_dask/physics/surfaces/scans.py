@@ -18,7 +18,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
-BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
+BEND = 3.0  # prior standard deviation of the change of the slope d log C2D / d log q between adjacent bins
 NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q exceeds this; roughness has -1 or less
 NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
@@ -99,7 +99,7 @@ def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    # waves beyond the last wave number of the cut contribute to the cut; C2D is assumed to end one bin beyond
+    # waves beyond the last wave number of the cut contribute to the cut; C2D is assumed to end one bin further
     edge = q[-1] ** 2 / q[-2]
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)

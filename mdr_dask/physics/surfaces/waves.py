@@ -16,7 +16,7 @@ from mdr_dask.physics.surfaces.roughness import spectral_slope
 class Waves:
     """A line h(x) = 2 Re sum_k c_k exp(2 pi i k x) of unit length and mean 0; `coefficients` are c_k for k = 1..modes.
 
-    `points` is the number of equidistant samples that determine the line (Nyquist points): 2 modes or 2 modes + 1.
+    `points` is the number of equidistant samples that determine the line (Nyquist points): 2 * modes or 2 * modes + 1.
     """
 
     coefficients: NDArray[np.complex128]

@@ -91,7 +91,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     if first.deborah > deborah:  # drift of elements free since before the jump, when D was D_1: u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes this increase from the start of the window until half a window after the jump.
+    # passed earlier. `opened` includes the part of this increase in the window, up to half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k

@@ -60,8 +60,8 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
 class Lapse(NamedTuple):
     """A duration, the factors of decay during this duration, and work arrays for one element.
 
-    `decay` and `fades` are the factors by which the modes and the strains of the Prony terms decay. `part_decay` and
-    `part_fades` are the factors for a part of the duration.
+    `decay` contains the factors by which the recovery modes decay. `fades` contains the factors by which the springs of
+    the Prony terms relax at constant displacement. `part_decay` and `part_fades` belong to a part of the duration.
     """
 
     time: float
@@ -86,7 +86,7 @@ def lapse_of(solid: Foundation, time: float) -> Lapse:
 
 @jit
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
-    """Write the factors by which the modes and the strains of the Prony terms decay during a duration."""
+    """Write the factors `decay` and `fades` of `Lapse` for the duration `step`."""
     for k in range(decay.size):
         decay[k] = np.exp(-solid.rates[k] * step)
     for m in range(fades.size):
