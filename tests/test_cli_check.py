@@ -143,7 +143,7 @@ def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, 
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
     ):
         assert f"  {line}\n" in printed
-    assert "line 4, velocity 10.5 mm/s (study: 1 mm/s to 10 mm/s); line 5, relaxation_times 100 (study: " in printed
+    assert "line 4, velocity 10.5 mm/s (study: 1 mm/s to 10 mm/s)" in printed
     assert "measured rig.csv: compared with friction_coefficient: coefficient of friction" in printed
 
 

@@ -40,7 +40,7 @@ def test_factors_merged_curve_and_figure_are_written(tmp_path, capsys):
         ("normal_force,velocity\n1,2\n", "name columns by --over, --of and --by"),
         ("frequncy,T,G'\n1,2,3\n2,3,4\n", "got frequncy (did you mean 'frequency'?), T, G': name"),
         ("force,mu,velocity\n1,0.5,1\n2,0.4,1\n", "two or more values of 'velocity', got one value"),
-        ("normal_force,velocity,mu\n1,2,3 N\n1,3,4\n", ":2:5: expected a number, got '3 N'"),
+        ("normal_force,velocity,mu\n1,2,3 N\n1,3,4\n", ":2: column mu: expected a number, got '3 N'"),
     ],
 )
 def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, content, message):
