@@ -190,7 +190,7 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have a single value and an effect in this series."""
+    """Return the parameters that have a single value in a series and that affect its results."""
     requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
     idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
@@ -202,7 +202,7 @@ def _given(data: xr.Dataset, name: str) -> list[Any]:
 
 
 def fixed_by_all(parts: Iterable[xr.Dataset]) -> dict[str, xr.DataArray]:
-    """Return the parameters that have a single value, the same value in all parts of a study."""
+    """Return the parameters that have one and the same value in all parts of a study."""
     held = [scalars(part) for part in parts]
     first = held[0] if held else {}
     return {

@@ -13,7 +13,7 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
 
-#: In the table of a figure: the columns to the left of the parameters, and the columns to the right.
+#: Columns of the table of a figure: `FIRST` to the left of the columns of parameters, `LAST` to the right.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
 #: Entry of the column ``what`` for results of a study.

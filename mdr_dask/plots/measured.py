@@ -124,7 +124,7 @@ def _differing(curves: list[xr.Dataset]) -> set[str]:
 
 
 def _at(curve: xr.Dataset, measured: Measured, data: xr.Dataset, along: str) -> np.ndarray:
-    """Return a mask of the measured points whose conditions belong to the parameters of a curve."""
+    """Return a mask of the points that were measured at the parameters of a curve."""
     here = np.ones(measured.values.size, dtype=bool)
     for name, values in measured.conditions.items():
         if name != along and name in curve.coords and curve[name].ndim == 0:

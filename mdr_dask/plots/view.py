@@ -182,7 +182,7 @@ def _unfit(data: xr.Dataset, view: View, output: str) -> str:
         return f"{output} varies along {rest[0]}: draw it over {rest[0]}, or select {rest[0]}=VALUE"
     dims = [(name, curves.along_dim(data, name, output)) for name in (*view.along, view.by, view.panels) if name]
     if view.panels and _is_sampled(data, dims[-1][1]):
-        return f"every case of a sampled study has its own {view.panels}: use it as 'by' instead of 'panels'"
+        return f"every case of a sampled study has its own value of {view.panels}: use it as 'by' instead of 'panels'"
     for name, dim in dims:
         if [each for _, each in dims].count(dim) > 1 and not _is_sampled(data, dim):
             return f"{name} is requested twice: curves, panels and axes need different parameters"

@@ -108,7 +108,7 @@ def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
     np.testing.assert_allclose(surface.height[~holes], expected[~holes], atol=1e-13)
     assert surface.size == pytest.approx((LENGTH, LENGTH * NY / NX), rel=1e-3)
     left_out = any(word in layout for word in ("axes", "pandas", "numbers", "position", "corner"))
-    assert ("lines of positions or row numbers are left out" in " ".join(remarks)) == (
+    assert ("they hold positions or row numbers" in " ".join(remarks)) == (
         left_out and "xyz" not in layout and "preamble" not in layout
     )
     assert dimensions(DataFile.of(path)) == 2

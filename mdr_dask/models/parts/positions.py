@@ -45,7 +45,7 @@ def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None,
         places = [*range(first), *range(len(lines) - last, len(lines))]
         steps.append(_common_step([lines[place, along] for place in places], name))
         left_out += [f"{name} {place + 1}" for place in places]
-    remarks = (f"lines of positions or row numbers are left out: {', '.join(left_out)}",) if left_out else ()
+    remarks = (f"left out, because they hold positions or row numbers: {', '.join(left_out)}",) if left_out else ()
     return rows[inner], (steps[0], steps[1]), remarks
 
 
