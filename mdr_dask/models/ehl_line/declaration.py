@@ -127,7 +127,7 @@ class EhlLineParameters(Parameters):
             raise ValueError("viscosity_law: roelands needs the parameter viscosity")
         if self.profile_end <= self.profile_start:
             raise ValueError(
-                f"expected profile_end above profile_start {self.profile_start!r}, got {self.profile_end!r}"
+                f"expected profile_end above profile_start {self.profile_start:.9g}, got {self.profile_end:.9g}"
             )
         return self
 
