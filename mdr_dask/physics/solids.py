@@ -141,7 +141,7 @@ def power_law_series(
     if not 0 < exponent < 1:
         raise ValueError(f"the exponent of a power-law spectrum must lie between 0 and 1, got {exponent!r}")
     if not 0 < lowest < highest:
-        raise ValueError(f"the range of frequency must be positive and not empty, got {(lowest, highest)!r}")
+        raise ValueError(f"the range of frequencies must be positive and ascending, got {(lowest, highest)!r}")
     decades = np.log10(highest / lowest)
     times = np.geomspace(0.1 / highest, 10 / lowest, round((decades + 2) * 2) + 1)
     omega = np.geomspace(lowest, highest, int(np.ceil(20 * decades)) + 1)

@@ -60,7 +60,7 @@ def test_power_law_series_keeps_its_promise(exponent):
 def test_power_law_series_refuses_what_is_no_power_law():
     with pytest.raises(ValueError, match=r"between 0 and 1, got 1.0"):
         power_law_series(1.0, 1.0, 1.0, 1.0, 1.0, 10.0)
-    with pytest.raises(ValueError, match="positive and not empty, got"):
+    with pytest.raises(ValueError, match="positive and ascending, got"):
         power_law_series(1.0, 1.0, 1.0, 0.5, 10.0, 1.0)
 
 

@@ -61,7 +61,7 @@ def measured_line(
 def _ordered(position: ArrayLike, height: ArrayLike) -> tuple[FloatArray, FloatArray]:
     x, z = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (position, height))
     if x.size != z.size or x.size < 8:
-        raise DataError(f"a measured line needs 8 or more pairs x, z, got {x.size} and {z.size}")
+        raise DataError(f"a measured line needs 8 or more pairs x, z, got {x.size} positions and {z.size} heights")
     if not np.all(np.isfinite(x) & np.isfinite(z)):
         raise DataError("a measured line must be finite: fill the points that the instrument left out")
     if x[0] > x[-1]:

@@ -32,7 +32,7 @@ class Spectrum:
     def __post_init__(self) -> None:
         q, density = self.wavenumber, self.density
         if q.size < 2 or q.size != density.size:
-            raise DataError(f"expected a spectrum of two points or more, got {q.size} and {density.size}")
+            raise DataError(f"a spectrum needs two points or more, got {q.size} wave numbers, {density.size} densities")
         for what, numbers in (("wave numbers", q), ("spectral densities", density)):
             if not np.all(np.isfinite(numbers) & (numbers > 0)):
                 raise DataError(f"expected positive and finite {what} in a spectrum")

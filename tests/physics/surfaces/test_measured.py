@@ -69,7 +69,7 @@ def test_statistics_are_those_of_the_spectrum():
 @pytest.mark.parametrize(
     ("x", "z", "message"),
     [
-        ([0, 1], [0, 1], "8 or more pairs x, z, got 2 and 2"),
+        ([0, 1], [0, 1], "8 or more pairs x, z, got 2 positions and 2 heights"),
         (range(9), [np.nan] * 9, "must be finite"),
         ([0, 1, 1, 2, 3, 4, 5, 6], [0] * 8, "must ascend or descend"),
     ],
