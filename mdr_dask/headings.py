@@ -96,7 +96,7 @@ def _key(name: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _names_of(name: str) -> list[str]:
-    """Return a name and all its synonyms. If `SYNONYMS` lacks the name, words in `IGNORED` are left out of the name."""
+    """Return a name and all its synonyms. If `SYNONYMS` lacks the name, the words in `IGNORED` are ignored."""
     lines = [line for line in SYNONYMS if plain(name) in map(plain, line)]
     lines = lines or [line for line in SYNONYMS if _key(name) in map(_key, line)]
     return [name, *(each for line in lines for each in line)]
@@ -161,7 +161,7 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             return alike[0], unit
     if found := exact or synonyms or ([] if unit else others):  # the unit is wrong or missing
         return found[0], unit
-    # a single word, and a unit that fits only one column: otherwise the name may mean another quantity
+    # synonyms of `other_names` count only if the name is one word, and the unit fits only one of their columns
     quantities = {line[0] for line in SYNONYMS} if " " not in plain(name) else set()
     short = [each for each in columns if any(is_called(name, other) for other in quantities & set(each.other_names))]
     if len(agreeing := [column for column in short if _agrees(unit, column)]) == 1:

@@ -160,12 +160,12 @@ def _workbook(content: bytes, source: str) -> str:
 
 
 def decimal_marks(texts: Sequence[str]) -> str:
-    """Return the decimal marks that all numbers may have, such as ``,`` for ``30,0`` and ``.,`` for ``3,158``."""
+    """Return the decimal marks with which all texts are numbers: ``,`` for ``30,0``, but ``.,`` for ``3,158``."""
     return "".join(mark for mark, form in _DECIMALS.items() if all(map(re.compile(form).fullmatch, texts)))
 
 
 def _of_workbook(cell: object, kinds: set[str]) -> str:
-    """Return a cell as text on one line, with decimal points as in the numbers of a workbook.
+    """Return a cell as text on one line, with a decimal point instead of a decimal comma.
 
     `kinds` contains the decimal marks of all texts in the workbook that have only one possible mark. A text such as
     ``3,158`` has two possible marks, and is read as a number only if `kinds` contains exactly one mark.
@@ -328,17 +328,17 @@ def _head(grid: _Grid, data: BoolArray, width: int) -> _Head:
     """Find the names and units in the lines of text above the numbers.
 
     `data` is a mask of the lines of numbers, and `width` is the number of cells of most of these lines. A candidate is
-    a line with `width` cells. Without candidates, the last line above the numbers contains the names. If the last
-    candidate contains names with units, there is no line of units. If a candidate other than the first is a line of
-    units, the candidate above this line contains the names. Otherwise the last candidate contains the names, and the
-    candidate above the names may be the line of units.
+    a line above the numbers with `width` cells. Without candidates, the last line above the numbers contains the names.
+    If the last candidate contains names with units, there is no line of units. If a candidate other than the first is a
+    line of units, the candidate above this line contains the names. Otherwise the last candidate contains the names,
+    and the candidate above the names may be the line of units.
     """
     full = np.flatnonzero(data & (grid.length == width))
     if not full.size:
         grid.require([len(grid.cells) - 1], NO_ROWS)
     begin = int(full[0])
     above = [row for row in range(begin) if not data[row]]
-    if not above and begin + 2 < data.size and not data[begin + 1]:  # the numbers are labels of pairs of columns
+    if not above and begin + 2 < data.size and not data[begin + 1]:  # the first numbers are labels of columns
         above, begin = [begin, begin + 1], begin + 2
     if not above:
         return _Head(None, None, None, begin)
@@ -392,9 +392,10 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 def _body(
     grid: _Grid, head: _Head, data: BoolArray, numeric: BoolArray
 ) -> tuple[list[int], list[tuple[str, str] | None], str]:
-    """Return the indices of the lines of numbers, the temperature stated above each line, and a remark on the end.
+    """Return the indices of the lines of numbers, the temperature stated above each line, and a remark.
 
-    DataError is raised for text between two lines of numbers, unless this text repeats the line of names.
+    The remark lists the lines below the numbers. DataError is raised for text between two lines of numbers, unless this
+    text repeats the line of names.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []
@@ -602,7 +603,7 @@ def _misspelt(sheet: Sheet, meanings: Sequence[Meaning], absent: Sequence[Column
 
 
 def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -> tuple[Read, list[str]]:
-    """Return the columns with a meaning in SI, and the problems of these columns."""
+    """Return the values, in SI, of the columns that have a `Column`, and the problems of these columns."""
     read, problems, taken = Read(), [], {}
     for place, (column, written, is_logarithm) in enumerate(meanings):
         if column is None:

@@ -175,7 +175,7 @@ def spelt(value: str) -> str:
     if _COMMA.match(value):
         return f" (write a decimal point: {value.replace(',', '.', 1)!r})"
     if _SEVERAL.search(value.strip()):
-        return " (several values are [a, b, c], a range {linear: [a, b, n]} or {geometric: [a, b, n]})"
+        return " (write several values as [a, b, c], or a range as {linear: [a, b, n]} or {geometric: [a, b, n]})"
     return ""
 
 
@@ -373,7 +373,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint with the unit in `COMMON` most similar to a word and, if `unit` is given, with its dimension."""
+    """Return a hint with a unit in `COMMON` that is similar to a word, and has the dimension of `unit` if given."""
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"

@@ -20,7 +20,7 @@ from mdr_dask.tables import AGREE, Line, Read, Sheet, further, listed, matched, 
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
-#: Names of errors in a heading, such as ``std``. An error stands before or after the name of an output, or alone.
+#: Names of errors in a heading, such as ``std``. They stand alone, or before or after the name of an output.
 _ERROR = re.compile(
     r"(?<!\w)(?:(?:std?|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|sem?)(?!\w)"
     r"|[σ±]|\+ ?/?"
@@ -59,7 +59,8 @@ def read_measured(
     axes: Mapping[str, ArrayLike] | None = None,
     wanted: Collection[str] = (),
 ) -> Measured:
-    """Read a table of measured points. `conditions` and `outputs` map names of possible columns to SI units.
+    """Read a table of measured points. `conditions` and `outputs` map names of possible columns to SI units, and `axes`
+    maps the names of the numerical axes of the study to their values.
 
     If the table contains several outputs, the output in `wanted` is read. A heading such as ``temperature`` may be
     short for ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An axis without a

@@ -113,7 +113,7 @@ class FrettingWear(Parameters):
         "tolerance": "write accuracy beside parameters, the relative error of every output",
         "accuracy": "write accuracy beside parameters, the relative error of every output",
         "load": "write normal_force",
-        "shear_modulus": "write effective_shear_modulus: it is G* of the pair, G of one body elsewhere",
+        "shear_modulus": "write effective_shear_modulus, which is G* of the pair and not G of one body",
         "modulus": "write contact_modulus",
         "curvature_radius": "write indenter: {shape: parabola, radius: ...}",
         "angle": "write indenter: {shape: cone, angle: ...}",

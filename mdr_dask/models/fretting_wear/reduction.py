@@ -95,7 +95,7 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
     for case, position in np.argwhere(numbers.level >= 1):
-        text = "nothing slips: the amplitude is below the rounding of mu E* d0 / G*"
+        text = "nothing slips: the amplitude is too small compared with mu E* d0 / G*"
         messages.setdefault((int(case), int(position)), text)
     known = np.isfinite(numbers.level) & np.isfinite(numbers.cycles)
     for unit in (numbers.length, numbers.height, numbers.force):
@@ -182,7 +182,7 @@ def table_profile(indenter: Indenter, depth: float) -> TableProfile:
     return _pressed_table(indenter.file, depth)
 
 
-@lru_cache(maxsize=1024)  # cases of a block share a solution only if they share a profile
+@lru_cache(maxsize=1024)  # cases share a solution only if their profile is the same object
 def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_table
 

@@ -30,7 +30,7 @@ from mdr_dask.physics.wear.exact import operations as exact_operations
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn, virgin_load
 
-#: Quantities that can be computed in closed form, for many cases at once.
+#: Quantities that `rules.limit_cases` and `rules.fast_cases` compute for many cases at once, and the stick border.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
 #: For each output that has another name in `Worn`, the name in `Worn`. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
@@ -149,9 +149,9 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
-    """Return whether closed forms give all requested outputs of a block.
+    """Return whether `rules.limit_cases` and `rules.fast_cases` can compute all requested outputs of a block.
 
-    Closed forms exist for power laws at constant depth without a load history, with the wear rule `limit` or `fast`.
+    These functions are for power laws at constant depth without a load history, with the wear rule `limit` or `fast`.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -166,7 +166,7 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
 def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
-    """Compute all cases of a block together, by the closed forms of the limiting profile or of the fast rule.
+    """Compute all cases of a block together, by `rules.limit_cases` or `rules.fast_cases`.
 
     Return the number of distinct cases. Each distinct case is computed only once.
     """

@@ -71,7 +71,7 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
-    """Return the contact at a time, computed by additional time steps if the history contains no contact at it."""
+    """Return the contact at a time, computed by additional time steps if the history lacks this time."""
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return history[before]

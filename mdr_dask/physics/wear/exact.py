@@ -58,7 +58,7 @@ class Resolution(NamedTuple):
 
     @property
     def flat(self) -> float:
-        """Limit of the rise (d - 1) / eta of the depth: below it, the stick border of the unworn body is used."""
+        """Rise (d - 1) / eta of the depth below which the stick border is computed from the virgin body."""
         return self.step / BORDER_WEIGHT
 
     def panels(self, near: int) -> Panels:
@@ -320,7 +320,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     if constant_force:
         problem = replace(problem, force=problem.normal_force(problem.start().unknowns))
     moments = march(problem, wanted[-1], resolution.step, resolution.step)
-    # a position that the edge passes within a time step begins to wear only at the end of this step, in all solutions
+    # in all solutions, a point that the edge passes within a time step begins to wear only at the end of this step
     return {
         path: replace(contact, least_errors={"contact_radius": resolution.accuracy * contact.contact_radius})
         for path, contact in ((path, _slid_contact(problem, at(problem, moments, path))) for path in wanted)

@@ -22,8 +22,8 @@ from mdr_dask.physics.wear.worn import Worn
 class LoadBlock:
     """Load cycles of constant amplitude, at constant `depth` (unit d0) or constant `force` (unit E* d0 a0).
 
-    `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is eta = G*
-    U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross. An infinite eta means sliding.
+    `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is
+    eta = G* U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross. An infinite eta means sliding.
     """
 
     cycles: float
@@ -35,7 +35,7 @@ class LoadBlock:
 def history(
     profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0, errors: bool = True
 ) -> list[Worn]:
-    """Return the contact at the end of every block, worn from a virgin body with the contact radius 1 at depth 1.
+    """Return the contact at the end of every block. The virgin body has the contact radius 1 at the depth 1.
 
     The error is about proportional to the cell width. After a block in which the image gets a jump, the error is about
     proportional to the square root of the cell width. `reach` is the largest radius of the grid in units of a0. If

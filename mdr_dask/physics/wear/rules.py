@@ -30,8 +30,10 @@ from mdr_dask.physics.wear.worn import (
 )
 
 LAYER_GROWTH = 30.0  # ratio of the widths of successive pieces of integration at the stick border
-SCAR = 1e-10  # tolerance of the integral that vanishes at the radius of the scar, relative to its values at the ends
-ERROR = 2e-6  # numerical error of every output, divided by the largest value; not the error of the fast rule
+#: Tolerance of the integral that vanishes at the scar radius, divided by the difference of the values of this integral
+#: at the two ends of the search interval.
+SCAR = 1e-10
+ERROR = 2e-6  # numerical error of every output, divided by its largest value; without the error of the fast rule itself
 
 
 _ABSCISSA, _WEIGHT = gauss(16)  # 16 nodes are sufficient for the accuracy `ERROR`
@@ -94,7 +96,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
 
 
 def _scar(profile: Profile, c: float, rest: float) -> Scar:
-    """Return a scar without its radius by the fast rule, or in the limit if `rest` is 0."""
+    """Return the scar by the fast rule, or the scar of the limiting profile if `rest` is 0. The scar radius is NaN."""
     check_stick_radius(c)
     eta = float(profile.rise(np.array(1.0 - c), c))
 
@@ -112,7 +114,7 @@ def _scar(profile: Profile, c: float, rest: float) -> Scar:
         inside = np.where(left > 0.0, rest / np.maximum(left, 1e-100) ** 2, 0.0)
         return np.asarray(profile.image_slope(x) * (np.where(x <= 1.0, inside, rest) - 1.0))
 
-    # in a layer at the stick border, the logistic law rises steeply; its width is the distance from c to y = 1/2
+    # the logistic law rises steeply in a layer at the stick border; the layer ends at the position with y = 1/2
     level = eta * rest / (1.0 + rest)
     layer = bisect(lambda gap: float(profile.rise(np.array(gap), c)) - level, 0.0, 1.0 - c) if rest > 0.0 else 0.0
     breaks = (*(min(c + layer * LAYER_GROWTH**k, 1.0) for k in range(3)), 1.0)

@@ -71,11 +71,11 @@ class Place(NamedTuple):
 class Past(NamedTuple):
     """Past contacts, the newest first. `shares` are the weights of these contacts in the BDF formula of one time step.
 
-    `worn` has the shape (contacts, nodes). While the stick border moves, `worn` contains the worn depths, and `frozen`
-    is NaN. If the border no longer moves, `frozen` is the worn depth at the border, and `worn` contains (worn depth -
-    frozen) / sqrt(z), where z is the position on the panels. At constant depth (`is_growth`), `worn` contains ln(s /
-    s0), because s grows exponentially from a very small s0. `path` and `moved` belong to the newest contact (see
-    `SlipMoment`), and `carried` is the result of `PartialSlip.carried`.
+    `worn` has the shape (contacts, nodes). At constant depth (`is_growth`), `worn` contains ln(s / s0), because s grows
+    exponentially from a very small s0. Under constant force, `worn` contains the worn depths as long as the stick
+    border moves, and `frozen` is NaN. If the border no longer moves, `frozen` is the worn depth at the border, and
+    `worn` contains (worn depth - `frozen`) / sqrt(z), where z is the position on the panels. `path` and `moved` belong
+    to the newest contact (see `SlipMoment`), and `carried` is the result of `PartialSlip.carried`.
     """
 
     shares: FloatArray
@@ -144,7 +144,7 @@ class PartialSlip:
         return Place(border, float(unknowns[self.size - 1]), 0.0 if self.load is None else float(unknowns[self.size]))
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether the slip zone has a positive width, and the border b is not far inside c."""
+        """Return whether the slip zone has a positive width, and b^2 > c^2 / 2 for the border b."""
         place = self.place(unknowns)
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
@@ -256,6 +256,7 @@ class PartialSlip:
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return s - known - theta (p / eta) s at the nodes. The value at the edge is zero if s is continuous there.
 
+        `theta` is the weight of the wear rate in the BDF formula, and `known` is computed by the function of `memory`.
         Under constant force, the next value is the computed load minus `load`. If the border moves, the last value is y
         at the border.
         """
@@ -287,7 +288,7 @@ class PartialSlip:
         return result
 
     def carried(self, path: FloatArray) -> float:
-        """Return int (1 - d) db along a path, where b is the radius of the border, and d is `Place.depth`."""
+        """Return the integral of (1 - d) over the border radius b along a path, where d is `Place.depth`."""
         radii = np.sqrt(self.body.square + self.body.width * path[0])
         steps = self.body.width * np.diff(path[0]) / (radii[1:] + radii[:-1])
         return float(steps @ (1.0 - 0.5 * (path[1, 1:] + path[1, :-1])))
@@ -299,7 +300,7 @@ class PartialSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities with controlled errors: s and, under constant force, the depth and a moving border."""
+        """Return the quantities whose errors limit the time step: s and, under constant force, depth and border."""
         weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)

@@ -1,8 +1,8 @@
 """The class `Worn` for a worn contact with its errors, and the integrals from the image to profile, pressure and
 volume.
 
-Lengths are divided by a0, heights by d0, pressures by E* d0 / a0, volumes by a0^2 d0, and numbers of cycles by N0 = a0
-sigma0 / (4 U0 k E*). Heights f are measured upwards from the virgin apex. Wear increases f.
+Lengths are divided by a0, heights by d0, pressures by E* d0 / a0, volumes by a0^2 d0, and numbers of cycles by
+N0 = a0 sigma0 / (4 U0 k E*). Heights f are measured upwards from the virgin apex. Wear increases f.
 """
 
 from __future__ import annotations
@@ -21,9 +21,7 @@ from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.refine import SAFETY
 
 EPS = float(np.finfo(np.float64).eps)
-JUMP_WIDTH = (
-    1e-9  # a change of the image within this distance from a border, divided by the radius of the border, is a jump
-)
+JUMP_WIDTH = 1e-9  # half-width of a jump of the image at the stick border, divided by the radius of this border
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +31,7 @@ class Worn:
     Parameters
     ----------
     contact_radius : float
-        Radius of the wear scar. Beyond the scar f = f0. In an exact evolution, the contact radius equals the radius of
-        the scar.
+        Radius of the wear scar. Beyond the scar, f = f0. In an exact evolution, the contact ends at the same radius.
     stick_border : float
         Radius up to which the contact sticks; 0 in gross slip.
     depth, normal_force : float
@@ -77,7 +74,7 @@ class Worn:
         """
         value = np.asarray(self.value(output, places))
         if self.rougher:
-            # the difference is largest at the stick borders, or between two positions
+            # the largest difference may lie at a stick border, or between two of the positions
             borders = [one.stick_border for one in (self, *self.rougher)]
             points = np.concatenate([places, 0.5 * (places[1:] + places[:-1]), borders])
             found = self.value(output, points)
@@ -92,7 +89,7 @@ class Worn:
 
 
 class Scar(NamedTuple):
-    """The change g - g0 of the image from the virgin stick radius c = `border` to the `radius` of the scar.
+    """The change g - g0 of the image, between the virgin stick radius c = `border` and the `radius` of the scar.
 
     `change` and its derivative `slope` are functions of position. At the positions in `breaks`, the change is not
     smooth.
@@ -133,7 +130,7 @@ def worn_volume(scar: Scar) -> float:
 def closed(profile: Profile, scar: Scar, high: float = 1.5) -> Scar:
     """Return the scar with the radius at which the worn profile meets the virgin profile, or 1 if nothing is worn.
 
-    `high` is a first estimate of an upper bound.
+    `high` is a first estimate of an upper bound of the radius.
     """
 
     def depth(radius: float) -> float:
