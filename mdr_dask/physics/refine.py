@@ -5,7 +5,7 @@ by r = 2^p at each level. Take three successive levels. Let b be the relative ch
 the second, and c the relative change from the second level to the third. The relative error on the third level is
 estimated as
 
-    error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
+    error = safety * max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first expression, c / (r - 1), is Richardson's estimate. The second expression is needed because the results on the
 last two levels may agree by chance. After the change b, the next change should be b / r. The safety factor is taken

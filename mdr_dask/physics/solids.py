@@ -240,7 +240,7 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
 
 
 def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy: float) -> FloatArray:
-    """Return a_T = exp(E / R (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol."""
+    """Return a_T = exp((E / R) (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol."""
     absolute = np.asarray(temperature, dtype=np.float64)
     if np.any(absolute <= 0) or reference <= 0:
         raise ValueError(f"absolute temperatures must be positive, got {temperature!r}")
