@@ -305,7 +305,7 @@ def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return the radii that divide an integral from c to the border, with small spacings where the image is steep."""
+    """Return radii that divide an integral from c to the border, closest at the border, where the image is steep."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)

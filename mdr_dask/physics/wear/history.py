@@ -1,8 +1,8 @@
 """Wear under a sequence of load blocks, each with a constant amplitude and a constant depth or force.
 
 The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
-slip in a block is partial or gross. The grid is uniform, because every block leaves a kink or a jump in the image at
-the stick border of this block.
+slip in a block is partial or gross. The grid is uniform, because the image has a kink or a jump at the stick border of
+every earlier block.
 """
 
 from __future__ import annotations

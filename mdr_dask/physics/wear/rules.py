@@ -55,7 +55,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:
-    """Return the limiting profile at constant depth, with the image g = g0 up to c, and g = 1 beyond c.
+    """Return the limiting profile at constant depth. The image is g0 up to c, and 1 from c to the radius of the scar.
 
     Examples
     --------

@@ -26,7 +26,7 @@ JUMP_WIDTH = 1e-9  # half-width of a jump of the image at the stick border, divi
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """A worn contact, computed by any rule or evolution.
+    """A worn contact, as returned by `rules`, `exact` and `history`.
 
     Parameters
     ----------
