@@ -65,6 +65,8 @@ def _campaign(url: str, text: str) -> tuple[bytes, dict[str, bytes]]:
         if name.is_absolute() or ".." in name.parts or ":" in name.parts[0]:
             text = text.replace(str(file["name"]), name.name)
             name = PurePosixPath(name.name)
+        if str(name) in found:
+            raise StoreError(f"{file['name']}: another file of the campaign is called {name} in the zip: rename a file")
         found[str(name)] = _read(file)
     return text.encode(), found
 

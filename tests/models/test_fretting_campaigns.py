@@ -151,7 +151,8 @@ def test_bad_numbers_are_refused_with_their_place(write, capsys, parameters, pla
     ("rows", "message"),
     [
         ("0,0\n1e-4,2e-6\n2e-4,1e-6\n1e-3,1e-3\n", "must rise with the radius, got the height 1e-06 after 2e-06"),
-        ("1e-5,0\n1e-4,1e-6\n2e-4,2e-6\n1e-3,1e-3\n", "must start at 0 and increase"),
+        ("1e-5,0\n1e-4,1e-6\n2e-4,2e-6\n1e-3,1e-3\n", "must start at 0, got 1e-05"),
+        ("0,0\n1e-4,1e-6\n1e-4,2e-6\n1e-3,1e-3\n", "must increase, got 0.0001 after 0.0001"),
         ("0,0\n1e-4,1x\n", "profile.csv:3: column height: expected a number, got '1x'"),
         ("-1e-4,1e-6\n0,0\n1e-4,1e-6\n2e-4,2e-6\n", "profile.csv:2: column radius: expected at least 0"),
     ],

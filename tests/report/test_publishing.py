@@ -143,3 +143,17 @@ def test_what_is_no_published_study_is_refused(content, folder, capsys):
         Path("other.zip").write_bytes(content)
     assert main(["verify", "other.zip"]) == 2
     assert "mdr-dask publish" in capsys.readouterr().err
+
+
+def test_two_files_of_one_name_are_refused(tmp_path, capsys):
+    """Both would have the same name in the zip."""
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "road.csv").write_text(spectrum())
+    (tmp_path / "work").mkdir()
+    files = "[../one/road.csv, ../two/road.csv]"
+    (tmp_path / "work/road.yaml").write_text(CAMPAIGN.format(realisations=1, file=files))
+    place = str(tmp_path / "road.zarr")
+    assert main(["run", str(tmp_path / "work/road.yaml"), "--store", place, "--quiet"]) == 0
+    assert main(["publish", place, "-o", str(tmp_path / "road.zip")]) == 2
+    assert "another file of the campaign is called road.csv in the zip" in capsys.readouterr().err

@@ -130,8 +130,13 @@ def check_table(radius: FloatArray, height: FloatArray) -> None:
         raise ValueError(
             f"a profile must be finite, got {float(radius[bad])!r}, {float(height[bad])!r} in row {bad + 1}"
         )
-    if radius[0] != 0.0 or np.any(np.diff(radius) <= 0.0):
-        raise ValueError(f"the radii of a profile must start at 0 and increase, got {float(radius[0])!r} first")
+    if radius[0] != 0.0:
+        raise ValueError(f"the radii of a profile must start at 0, got {float(radius[0])!r}")
+    if np.any(np.diff(radius) <= 0.0):
+        bad = int(np.argmax(np.diff(radius) <= 0.0))
+        raise ValueError(
+            f"the radii of a profile must increase, got {float(radius[bad + 1])!r} after {float(radius[bad])!r}"
+        )
     if np.any(np.diff(height) <= 0.0):
         bad = int(np.argmax(np.diff(height) <= 0.0))
         raise ValueError(
