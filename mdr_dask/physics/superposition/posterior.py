@@ -256,9 +256,8 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     pull = away @ known
     energy = 0.5 * (log_determinant + np.sum(precision * left * target - np.log(precision), axis=(1, 2)))
     energy += 0.5 * np.sum(pull * away, axis=1)
-    by_scale = 1 - precision * (
-        left**2 + variance
-    )  # derivative with respect to the logarithm of the standard deviation of each datum
+    # derivative of the energy with respect to the logarithm of the standard deviation of each datum
+    by_scale = 1 - precision * (left**2 + variance)
     by_bend, lever = by_scale[..., points:], share * apart / REACH**2
     turn = np.sum(weight[..., None] * (tilt - left[:, :, inner] * steep), axis=1)
     by_shift = CELLS * turn @ np.eye(count)[curves.member]
