@@ -32,7 +32,7 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: A position x/a has an error relative to the half width a, unless the position lies outside the contact.
+#: Floors (see `solve_film`): within the contact, the error of a position is divided by the half width a.
 _FLOORS = {"spike_position": 1.0}
 
 
@@ -89,7 +89,7 @@ def _estimates(
 
 
 def _spike(solution: LineSolution) -> Estimate:
-    """Return the position of the spike on the finest grid. The error is its last movement plus the width of a cell."""
+    """Return the position of the spike. The error is the change between the last grids plus the width of a cell."""
     places = np.array([grid.spike for grid in solution.grids[-3:]])
     moves = np.abs(np.diff(places))
     moved = float(max(moves[-1], 0.5 * moves[-2])) if moves.size > 1 else np.inf
@@ -100,7 +100,8 @@ def _spike(solution: LineSolution) -> Estimate:
 def compute(block: Block[EhlLineParameters]) -> Result:
     """Solve the cases of a block. All realisations of a case have the same result.
 
-    Equal contacts share a solution, even if the sliding differs, unless the traction must meet an accuracy.
+    Cases with the same contact share a solution, even if the sliding differs. If the traction must meet an accuracy,
+    every case is solved separately.
     """
     parameters, contacts = _groups(block), _line_contacts(block)
     formulas = {"formula_central_film": PAN_HAMROCK_CENTRAL, "formula_minimum_film": PAN_HAMROCK_MINIMUM}
@@ -164,15 +165,15 @@ def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[floa
 
 
 def distinct(block: Block[EhlLineParameters]) -> int:
-    """Return the number of solutions of a block. Equal cases share one solution."""
+    """Return the number of different contacts in a block. Cases with the same contact usually share a solution."""
     return len(set(_line_contacts(block)))
 
 
 def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of a block.
 
-    The number counts the matrix entries in all Newton steps. If a campaign with an accuracy requests the pressure or
-    the position of its spike, a solution needs the finest grid.
+    The number is proportional to the number of matrix entries in all Newton steps. With an accuracy, the pressure and
+    the position of the spike are assumed to need the finest grid.
     """
     is_sharp = block.accuracy is not None and {"pressure", "spike_position"} & set(block.outputs)
     return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * distinct(block)

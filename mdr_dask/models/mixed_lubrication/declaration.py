@@ -33,7 +33,7 @@ class MixedLubrication(Parameters):
     renamed: ClassVar[Mapping[str, str]] = {
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
-        "measured": "write measured: {table: ...} beside parameters, and fit calibration",
+        "measured": "write measured: {table: ...} beside parameters, and run mdr-dask fit STORE calibration",
         "load_share": "write asperity_load_share",
         "turn_error": "write revolution_error",
         "profile_1": "write surface_1: {profile: ...}",
@@ -68,15 +68,15 @@ class MixedLubrication(Parameters):
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
         "longest wavelength of the roughness; the pressure on the asperities at a given film is inversely proportional "
-        "to it. auto is the width 2a of the Hertzian contact under cutoff_force. Waves of measured profiles are not "
-        "removed",
+        "to it. auto is the width 2a of the Hertzian contact under cutoff_force. Measured profiles are not "
+        "filtered",
         usual="0.4 mm",
         default="auto",
     )
     cutoff_force: float = quantity(
         "N",
-        "normal force for longest_wavelength: auto, the largest force of a rig; the contact width under this force is "
-        "the longest wavelength",
+        "normal force, used only with longest_wavelength: auto; the contact width under this force is the longest "
+        "wavelength. Usually the largest force of the rig",
         usual="1600 N",
         default=1600,
         gt=0,
@@ -101,7 +101,7 @@ class MixedLubrication(Parameters):
     )
     pressure_viscosity: Positive | Literal["oil"] = quantity(
         "1/Pa",
-        "pressure-viscosity coefficient alpha; oil: as a function of the viscosity, by the correlation of the oil",
+        "pressure-viscosity coefficient alpha; oil means: computed from the viscosity by the correlation of the oil",
         usual="20 1/GPa",
         default="oil",
     )
@@ -202,7 +202,7 @@ class MixedLubrication(Parameters):
         one, two = self.surface_1, self.surface_2
         if one is None and two is None:
             missing = self.rms_roughness is None or self.hurst is None
-            return "expected rms_roughness, or surface_1 and surface_2, got neither" if missing else ""
+            return "expected rms_roughness and hurst, or surface_1 and surface_2, got neither" if missing else ""
         if one is None or two is None:
             return "expected both surface_1 and surface_2 or neither, got one"
         if (one.profile is None) != (two.profile is None):
@@ -266,7 +266,7 @@ OUTPUTS = (
     Output(
         "revolution_error",
         "1",
-        "standard error of breakthrough_probability in one revolution, from the scatter between its parts",
+        "standard error of breakthrough_probability, from the scatter between the parts of one revolution",
         default=False,
     ),
     Output(

@@ -107,7 +107,7 @@ class OilData(Parameters):
             worst = int(np.argmax(abs(off)))
             first, last = (found.at(float(temperature[end])) * 1e6 for end in (0, -1))
             notes.append(
-                f"table {self.viscosities.name}: ASTM D341 through {off.size} kinematic viscosities, {first:.4g} to "
+                f"table {self.viscosities.name}: ASTM D341 fitted to {off.size} kinematic viscosities, {first:.4g} to "
                 f"{last:.4g} mm^2/s; largest deviation {off[worst]:+.2g} % at {shown(float(temperature[worst]), 'K')}"
             )
         one, _, two, _ = self.two_viscosities

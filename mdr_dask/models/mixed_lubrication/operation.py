@@ -77,7 +77,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
     accuracy = accuracy or ACCURACY
 
     def smooth(share: float) -> LineContact:
-        """Return the contact in which the film carries a fraction of the load."""
+        """Return the smooth contact with this share of the load and of the modulus (see `load_sharing`)."""
         numbers, modulus = (W, U / share, G * share), case.contact_modulus * share
         return line_contact(numbers, modulus, viscosity_law=case.viscosity_law, viscosity=viscosity)
 

@@ -23,7 +23,7 @@ from mdr_dask.physics.refine import Solution, refine
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
 #: Outputs that can be zero, each with a floor. The error of an output that is smaller than the floor is divided by the
-#: floor. The floor of the contact length is divided by the width of the contact.
+#: floor. The floor of the contact length is a fraction of the width of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
 #: Parameters on which the rough lines depend. Cases have the same lines if all these parameters are equal.
 _SHARED = {
@@ -122,8 +122,8 @@ def _realise(
     if block.accuracy is None:  # two grids if errors are requested, otherwise one grid
         points = points[:2] if any(f"{name}_error" in block.outputs for name in _OF_LINES) else points[:2][-1:]
     accuracy = block.accuracy or np.inf
-    # The assumed order of convergence is 1, although splines converge faster: a single cluster may break the layer on
-    # one grid but not on the next grid, and contact may begin between two windows.
+    # The assumed order of convergence is only 1, because a single cluster may break the layer on one grid but not on
+    # the next grid, and because contact may begin between two windows. The splines themselves converge faster.
     errors = refine(solve, len(members), points, accuracy, order=1, floors=floors).errors
     for k, (index, operation) in enumerate(members):
         of_length = errors[-1, k] * operation.width if with_length else np.nan

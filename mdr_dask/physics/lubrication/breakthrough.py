@@ -2,8 +2,8 @@
 
 A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``. The cluster breaks
 the layer if ``int (z - h0) dx > s D^3``, with the length D of the interval and the result s of `layer_strength` (eqs.
-5.5, 5.6). The contact zone is a window that begins at each node in turn. A cluster ends at the edges of the window. The
-lines are closed cubic splines. The first node follows the last node, and all integrals are exact.
+5.5, 5.6). The contact zone is a window that begins at each node in turn and cuts clusters at its edges. The lines are
+closed cubic splines: the first node follows the last node. All integrals are exact.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares
 
-PARTS = 64  # number of equal parts of the spacing of nodes; lengths in contact are whole numbers of parts
+PARTS = 64  # number of equal parts of the spacing of nodes; lengths in contact are rounded to whole parts
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
@@ -100,9 +100,9 @@ def _add_middles(clusters: Clusters, c: int, window: float, jumps: NDArray[np.in
 
 @jit
 def _collect(clusters: Clusters, window: float, jumps: NDArray[np.int32]) -> None:
-    """Write the lengths in contact of all windows to `jumps`. At first, `jumps` must contain zeros."""
+    """Write the lengths in contact of all windows to `jumps`, which must contain only zeros before the call."""
     points = jumps.size - 1
-    # a part of a cluster that is longer than `reach` cannot break the layer
+    # if a part of a cluster is longer than `reach`, this part cannot break the layer
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
     for c in range(clusters.start.size):
         start, end = clusters.start[c], clusters.end[c]
@@ -158,7 +158,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window. `work` is workspace for ``z - h0`` and the zeros."""
+    """Return the length in intimate contact of one window. `work` is workspace for ``z - h0`` and its zeros."""
     pieces = int(np.ceil(window))
     overlap, found = work[: pieces + 3], work[pieces + 3 :]
     limit = pair.strength * pair.spacing**2
@@ -201,9 +201,9 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the nodes of line 1 and of line 2 nearest to the left edge of the window after each distance `travel`.
+    """Return the nodes of line 1 and of line 2 nearest to the left edge of the window after each distance in `travel`.
 
-    `travel` is in spacings and is covered at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``,
+    The distances are in spacings and are covered at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``,
     line 1 moves by ``1 + S/2`` times the travel, and line 2 by ``1 - S/2`` times the travel.
     """
     steps = np.asarray(travel, dtype=np.float64)

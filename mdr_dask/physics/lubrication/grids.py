@@ -10,7 +10,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-FLOODED = 300.0  # flooded inlet: distance from X = -1 in units of sqrt(2 H(0)); relative error of the film: 2e-5
+FLOODED = 300.0  # distance of a flooded inlet from X = -1, divided by sqrt(2 H(0)); relative error of the film: 2e-5
 
 
 def inlet_position(central_film: float) -> float:
@@ -32,12 +32,12 @@ def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray
 
 
 def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
-    """Return the number of cells before each position, shape (m,)."""
+    """Return the number of cells upstream of each position, not rounded."""
     return np.concatenate([[0.0], np.cumsum(np.diff(positions) * (density[1:] + density[:-1]) / 2)])
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the positions before which there are `wanted` cells. Beyond the last position, the density is constant."""
+    """Return the positions with `wanted` cells upstream. Beyond the last of `positions`, the density is constant."""
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]
@@ -53,8 +53,8 @@ def aligned(
 ) -> tuple[FloatArray, float]:
     """Return about `count` nodes with a given density, and the product of node spacing and density.
 
-    A node lies at `rupture`, where the film ends, so that errors on several grids can be compared. Unless `front` (see
-    `GridSolution.front`) is NaN, this position lies near the middle of a cell.
+    A node lies at `rupture`, where the film ends, so that errors on several grids can be compared. The position `front`
+    (see `GridSolution.front`), unless it is NaN, lies near the middle of a cell.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)

@@ -27,10 +27,12 @@ NODES = (40, 80, 160, 320, 640, 1280)  # numbers of nodes of the grids; a Newton
 ORDER = 3.0  # order of convergence of the values extrapolated from two grids
 ACCURACY = 1e-3  # allowed relative error of the films if no accuracy is given
 PRELIMINARY = 2  # the preliminary grids, which determine the density of nodes, have NODES[PRELIMINARY] nodes
-#: Attempts at the first solution of a case; the second attempt is slow but hardly ever fails.
-#: Entries: factor of the expected film; limit of guess / (inlet position)^2; number of nodes; limits of the iteration.
+#: Attempts at the first solution of a case; the second attempt is slow but hardly ever fails. Each attempt has a guess
+#: of the film, divided by the expected film; an upper limit of the guess, divided by the square of the inlet position;
+#: the number of nodes; and the limits of Newton's method.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Limits of Newton's method on all further grids. If the first attempt fails, the second limits apply to another guess.
+#: Limits of Newton's method on all further grids. If no solution is found within the first limits, the second limits
+#: are used with another guess.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
@@ -186,7 +188,7 @@ def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
 def _refined(
     case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on about `count` nodes with the density of `source`. `before` contains the last one or two solutions."""
+    """Solve on about `count` nodes, placed by `source.density`. `before` contains the last one or two solutions."""
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
     end = float(expected(before, lambda grid: grid.rupture, spacing))
@@ -219,10 +221,11 @@ def solve_film(
         Allowed relative error of the central film, the minimum film and the `readings`. The grid is refined until no
         estimated error exceeds `accuracy`, or until the finest grid is reached.
     readings : sequence of callable, GridSolution -> float or array
-        Further quantities, or profiles at fixed positions. The error of a profile is its largest error.
+        Further quantities, or profiles at fixed positions. The relative error of a profile is the largest error along
+        the profile, divided by the largest absolute value.
     floors : sequence of float
-        One floor for each reading, or none if all floors are 0. If a reading is below the floor, the relative error is
-        the error divided by the floor.
+        One floor for each reading, or an empty sequence if all floors are 0. If a reading is below the floor, the
+        relative error is the error divided by the floor.
     films_only : bool
         Whether only the central and the minimum film must meet the accuracy.
 
@@ -288,7 +291,7 @@ def solve_film(
 
 
 def operations(accuracy: float) -> float:
-    """Return the approximate number of operations of `solve_film`: 30 n^2 in each of ten Newton steps on each grid."""
+    """Return the approximate number of operations of `solve_film`: 30 n^2 in each of ten steps on a grid of n nodes."""
     # each finer grid divides the error by 8, because the error is of third order
     grids_needed = 1.0 if accuracy == 0 else min(np.log(1 / accuracy) / np.log(8) / len(NODES), 1.0)
     nodes = np.array([NODES[PRELIMINARY]] * 2 + [*NODES[: round(grids_needed * len(NODES))]])

@@ -30,7 +30,7 @@ def distance_of_means(gap: float) -> float:
     """Return the distance d (see `mean_overlap`) for a mean gap ``<(d - z)+>``, in units of the rms height."""
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
-    # the mean gap at d, `mean_overlap(-d)`, is at least d; the logarithm of the mean gap varies slowly with d
+    # d is at most `gap`, because the mean gap, `mean_overlap(-d)`, is at least d; its logarithm varies slowly with d
     return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, gap + 1, xtol=1e-13))
 
 

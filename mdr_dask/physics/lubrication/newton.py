@@ -1,9 +1,9 @@
 """Semismooth Newton method for pressure and central film of a lubricated line contact on a given grid, in Hertz units.
 
 The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), which is
-integrated over finite volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0`` for the
-pressure P and the inflow minus outflow R of each volume. The unknowns are the pressures at the nodes and the film at
-``X = 0``. The load gives one more equation, ``int P dX = pi/2``.
+integrated over finite volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0``. Here, P is
+the pressure at a node, and R is the inflow minus the outflow of the volume around this node. The unknowns are the
+pressures at the nodes and the film at ``X = 0``. The load gives one more equation, ``int P dX = pi/2``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-_QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; the rest is linear upwind
+_QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; linear upwinding has the rest
 _FILM_SHARE = 0.8  # one Newton step may reduce the film at a node by at most this fraction
 _LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
 _SHRINKS = 0.1  # a factorised Jacobian is reused while each step is smaller than this fraction of the previous step
@@ -30,7 +30,7 @@ _TOLERANCE = 1e-4
 
 
 class Grid(NamedTuple):
-    """Nodes in half widths, weights of the nodes in the trapezoidal rule, and the result of `influence_matrix`."""
+    """Node positions in half widths, weights of the trapezoidal rule, and the result of `influence_matrix`."""
 
     nodes: FloatArray
     weights: FloatArray
@@ -46,7 +46,7 @@ class Grid(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Largest change of a pressure per step, divided by the largest pressure, and largest number of Newton steps."""
+    """Limits: `clip` for pressure changes per step, divided by the largest pressure; `most` for the number of steps."""
 
     clip: float
     most: int
@@ -65,8 +65,8 @@ class Liquid(NamedTuple):
     """Viscosity and density as functions of pressure, in Hertz units.
 
     `alpha` is the pressure-viscosity coefficient times p0. `pole` is the pressure p_r of Roelands' law divided by p0,
-    and `exponent` is the exponent z of Roelands' law, or zero for Barus' law. The relative density ``rho/rho0`` is ``1
-    + rise P/(1 + saturation P)``.
+    and `exponent` is the exponent z of Roelands' law, or zero for Barus' law. The relative density ``rho/rho0`` is
+    ``1 + density_rise P/(1 + density_saturation P)``.
     """
 
     alpha: float

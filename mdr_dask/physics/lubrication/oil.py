@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 _LUBRICANT_EXPANSION = 0.6278  # expansion in 1/K times density in kg/m^3, both at 60 F (ASTM D1250, table 54D)
 
 #: Pairs (s, t) of Gold's correlation ``alpha = s nu^t 1e-9``, with nu in mm^2/s, for each kind of oil.
-#: A public repository has the same pair for mineral oils (see docs/evidence/mixed-lubrication.md).
+#: Only the pair for mineral oils could be confirmed (see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
     "gold_polyalphaolefin": (7.382, 0.1335),

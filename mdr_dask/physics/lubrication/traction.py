@@ -44,9 +44,9 @@ def uniform_film_coefficient(
     """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
 
     `stress` is the Newtonian shear stress in Pa at ambient pressure, ``eta0 v/h``, and must not be zero. The shear
-    stress is ``tau_E asinh(tau/tau_E)``, with the Newtonian stress tau under pressure and `eyring_stress` tau_E in Pa.
-    If tau_E is very large, the liquid is Newtonian. `film_share` is the fraction of the load, and of the pressure, that
-    the film carries. Rolling friction is not included.
+    stress is ``tau_E asinh(tau/tau_E)``. Here, tau is the Newtonian stress at the pressure of the film, and tau_E is
+    `eyring_stress` in Pa. If tau_E is very large, the liquid is Newtonian. `film_share` is the fraction of the load,
+    and of the pressure, that the film carries. Rolling friction is not included.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
