@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-_CLOSED = -37.0  # in rms heights: the distance between the mean heights at which the mean gap is about 1e-301
+_CLOSED = -37.0  # distance d (see `mean_overlap`), in rms heights, with a mean gap of about 1e-301
 
 
 def mean_overlap(distance: float) -> float:
