@@ -16,26 +16,38 @@ from mdr_dask.physics.lubrication.newton import Liquid, log_viscosities
 
 
 def shear_stress(
-    case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
+    case: LineContact,
+    pressure: FloatArray,
+    film: FloatArray,
+    W: float,
+    slide_roll_ratio: float,
+    eyring_stress: float | None,
 ) -> FloatArray:
-    """Return the shear stress in the middle of the film at the nodes, in units of p0, or zero where there is no film.
+    """Return the shear stress in the middle of the film, in units of p0, where the film has the given pressures.
 
-    The Newtonian stress is ``tau = eta (u1 - u2)/h``, with the slide-roll ratio ``(u1 - u2)/u``. With an Eyring stress
-    tau_E in units of p0, the stress is ``tau_E asinh(tau/tau_E)``. The load parameter W is needed for the ratio
-    ``a/R = sqrt(8 W/pi)``.
+    `pressure` is in units of p0, and `film` in units of ``a^2/R``. The Newtonian stress is ``tau = eta (u1 - u2)/h``,
+    with the slide-roll ratio ``(u1 - u2)/u``. With an Eyring stress tau_E in units of p0, the stress is
+    ``tau_E asinh(tau/tau_E)``. The load parameter W is needed for the ratio ``a/R = sqrt(8 W/pi)``.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
-    exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), 600.0)  # a larger exponent could overflow
-    newtonian = np.where(grid.pressure > 0, slope * np.exp(exponent) / grid.film, 0.0)
+    exponent = np.minimum(log_viscosities(pressure, case.liquid), 600.0)  # a larger exponent could overflow
+    newtonian = slope * np.exp(exponent) / film
     return newtonian if eyring_stress is None else eyring_stress * np.arcsinh(newtonian / eyring_stress)
 
 
 def sliding_coefficient(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> float:
-    """Return the integral of the shear stress in the middle of the film (see `shear_stress`), divided by the load."""
-    stress = shear_stress(case, grid, W, slide_roll_ratio, eyring_stress)
-    return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
+    """Return the integral of the shear stress in the middle of the film (see `shear_stress`), divided by the load.
+
+    The film reaches from the first node to the rupture, which may lie between two nodes.
+    """
+    upstream = grid.nodes < grid.rupture
+    places = np.append(grid.nodes[upstream], grid.rupture)
+    pressure = np.append(grid.pressure[upstream], 0.0)
+    film = np.append(grid.film[upstream], grid.film_between(places[-1:]))
+    stress = shear_stress(case, pressure, film, W, slide_roll_ratio, eyring_stress)
+    return float(2 / np.pi * np.trapezoid(stress, places))
 
 
 def uniform_film_coefficient(
