@@ -97,7 +97,7 @@ class Calibration:
 
     @cached_property
     def residuals(self) -> Residuals:
-        """Residuals of the prediction in the cell of the highest density."""
+        """Residuals of the prediction for the most probable unknowns."""
         if self.contradicted is not None:
             return self.contradicted
         measured, predicted = self.measured, self.prediction(self.posterior.places[[self.posterior.best]])

@@ -41,7 +41,7 @@ class View:
     the parameter `by`. There is one panel for each value of the parameter `panels`. `log` contains the letters of the
     logarithmic axes (x, y, and z for colours). If `log` is None, an axis is logarithmic if the numbers are positive and
     span more than a factor of ten, with two exceptions: the vertical axis of an output that is a pure number is linear,
-    and both axes are linear for an output against its own dimension, such as a profile. If `single` is true, the first
+    and both axes are linear for an output that is a curve, such as a profile. If `single` is true, the first
     realisation is drawn instead of the mean. `guides` contains positions and names of horizontal lines for each output.
     """
 
@@ -71,8 +71,8 @@ class View:
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameter that has the most values among the parameters with which an output varies. If the output has
-    its own dimension, such as time, return this dimension instead.
+    """Return the parameter that has the most values among the parameters with which an output varies. If the output is
+    itself a curve, for example against time, return the coordinate of this curve instead.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):

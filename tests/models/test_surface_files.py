@@ -117,7 +117,7 @@ def test_noise_hides_no_grooves_and_few_waves_are_no_grooves(tmp_path):
     [
         ("map.npy", HEIGHT[:8], "expected a map of 16 x 16 points or more"),
         ("map.npy", 0 * HEIGHT, "expected a rough map, got a flat one"),
-        ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), "expected at most 5 % of missing points"),
+        ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), "at most 5 % of the points are missing"),
         ("map.npy", b"nothing", "expected a numpy array"),
         ("map.opd", b"nothing", "SurfaceTopography cannot read it"),
     ],

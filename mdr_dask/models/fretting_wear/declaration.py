@@ -238,7 +238,7 @@ class FrettingWear(Parameters):
             )
         if isinstance(self.indenter, Table) and self.depth is None:
             raise ValueError(
-                "a table of a profile needs a dimensional campaign: give depth, instead of normal_force or stick_radius"
+                "a table of a profile needs the depth in metres: give depth instead of normal_force or stick_radius"
             )
         if self.wear_rule == "fast" and self.hold == "force":
             raise ValueError(FAST_AT_DEPTH)

@@ -146,7 +146,7 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
             raise DataError(
                 f"{protocol.file.name}: the first of two rows at t = 0 states the velocity and the force before t = 0: "
                 f"expected {before[0]:g} m/s and {before[1]:g} N, got {rows[0][1]:g} m/s and {rows[0][2]:g} N; "
-                "correct that row, or velocity, normal_force and start of the campaign"
+                "correct that row, or the parameters velocity, normal_force and start"
             )
     found = [Piece(a[0], b[0], (a[1], b[1]), (a[2], b[2])) for a, b in pairwise(rows) if b[0] > a[0]]
     end = rows[-1]

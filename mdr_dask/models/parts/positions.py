@@ -91,8 +91,8 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
-    # Positions on one grid line differ by small deviations. Neighbouring grid lines with positions are 1 to about 3
-    # steps apart. A gap counts as a deviation if the gap is at most a quarter of the largest gap.
+    # Positions on one grid line differ by small deviations. Some grid lines may have no positions; those that have
+    # positions are 1 to about 3 steps apart. A gap of at most a quarter of the largest gap is such a deviation.
     lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):

@@ -212,7 +212,7 @@ def _merged(
     width: float,
     generator: np.random.Generator,
 ) -> Superposition:
-    """Compute the merged curves and the factors from draws of the parameters; the first group is the reference."""
+    """Compute master curves and shift factors from draws of all parameters. The first curve is the reference."""
     count, channels, lines = values.size, problem.y.shape[0], values.size - 1
     shifts = np.concatenate([np.zeros((len(rows), 1)), rows[:, :lines]], axis=1)
     mean = shifts.mean(axis=0)

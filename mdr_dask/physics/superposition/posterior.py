@@ -210,7 +210,9 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     of_offsets, tied = np.zeros((many, 0)), np.zeros((many, 0, 0))
     corner = tied
     if offsets:
-        ties = at[:, :, :points] * count + curves.member[:, None]  # coefficients and offset of each point
+        ties = (
+            at[:, :, :points] * count + curves.member[:, None]
+        )  # one index for each pair of a coefficient and an offset
         sides = np.hstack([sides, -total(ties, weighted[:, :, :points], count).reshape(-1, count)])
         of_offsets = -weight @ curves.y @ np.eye(count)[curves.member]
         tied = curves.tied * np.exp(-2 * logs[:, -1, None, None])

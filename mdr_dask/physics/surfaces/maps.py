@@ -72,8 +72,8 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
     """Raise DataError if the fraction of missing points exceeds `MOST_MISSING`."""
     count = int(np.count_nonzero(missing))
     if count > MOST_MISSING * missing.size:
-        most, got = f"{100 * MOST_MISSING:g} % of missing points", f"{count} of {missing.size}"
-        raise DataError(f"expected at most {most} (missing points are filled), got {got}")
+        most, got = f"{100 * MOST_MISSING:g} % of the points", f"{count} of {missing.size}"
+        raise DataError(f"expected a map in which at most {most} are missing, got {got}")
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:

@@ -480,7 +480,7 @@ class GrossSlip:
         return np.append(unknowns[: self.panels.nodes.size - 1], 1.0 if self.force is None else unknowns[-1])
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return p at the nodes."""
+        """Return the pressure p at the nodes, to which the rate of wear is proportional."""
         return np.asarray(self.panels.outer @ self.image(unknowns) / self.edge(unknowns))
 
     def worn(self, unknowns: FloatArray) -> FloatArray:

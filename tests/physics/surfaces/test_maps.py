@@ -87,7 +87,7 @@ def test_missing_points_are_filled():
     assert mended.rms_height == pytest.approx(known.rms_height, rel=0.01)
     assert mended.rms_gradient == pytest.approx(known.rms_gradient, rel=0.05)
     damaged[: int(256 * MOST_MISSING) + 1] = np.nan
-    with pytest.raises(DataError, match="expected at most 5 % of missing points"):
+    with pytest.raises(DataError, match="at most 5 % of the points are missing"):
         filled(SurfaceMap(damaged, heights.size))
 
 

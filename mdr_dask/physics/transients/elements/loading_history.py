@@ -263,11 +263,11 @@ class Piece:
 class Trace(NamedTuple):
     """Friction during a history.
 
-    The friction is the drag F_x / (4 G L) divided by the load F_N / (4 G_inf L), in the unit of height divided by the
-    unit of length. `before` is the friction in the steady state before t = 0. `at` is the friction just after t = 0.
-    `after` is the friction in the final steady state. `after` is NaN if the history does not end in steady forward
-    sliding. At a jump, `friction` and `depth` are the values just after the jump. `contact` is the largest fraction of
-    the line in contact from t = 0 to the last requested time.
+    The friction is F_x / F_N, in the unit of height divided by the unit of length. `before` is the friction in the
+    steady state before t = 0. `at` is the friction just after t = 0. `after` is the friction in the final steady state.
+    `after` is NaN if the history does not end in steady forward sliding. At a jump, `friction` and `depth` are the
+    values just after the jump. `contact` is the largest fraction of the line in contact from t = 0 to the last
+    requested time.
     """
 
     before: float
