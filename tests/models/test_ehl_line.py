@@ -89,6 +89,15 @@ def test_cases_share_what_is_the_same() -> None:
     assert 0 < result.values["traction_coefficient"][2, 0] < result.values["traction_coefficient"][1, 0]
 
 
+def test_an_impossible_traction_has_a_message() -> None:
+    columns = {"slide_roll_ratio": [0.1, 0.1], "shear_law": np.array(["newtonian", "eyring"], object)}
+    asked = block(("traction_coefficient",), columns, **(CHECKED | {"load_parameter": 1e-4}))
+    result = compute(asked)
+    assert result.values["traction_coefficient"][0, 0] > 1 > result.values["traction_coefficient"][1, 0]
+    assert "use an Eyring stress" in result.messages[0, 0]
+    assert (1, 0) not in result.messages
+
+
 def test_errors_are_absolute_and_in_the_unit_of_their_output() -> None:
     """Errors of films are converted from h/R to m. Errors of a profile contain the difference to a finer solution."""
     names = ("central_film", "minimum_film", "central_film_thickness", "film", "pressure", "spike_position")

@@ -145,6 +145,10 @@ def compute(block: Block[EhlLineParameters]) -> Result:
                     f" on {solution.finest.nodes.size} nodes",
                 )
                 notes += [missed.get(0, ""), thick_film(float(solution.central_film.value) * square_of_half_width(W))]
+                if "traction_coefficient" in found and found["traction_coefficient"].value > 1:
+                    notes.append(
+                        "no oil has a traction coefficient above 1, and its error is unknown: use an Eyring stress"
+                    )
             else:
                 result.status[index] = Status.NOT_CONVERGED
             notes += _warnings(block, index, [float(group[index]) for group in parameters])
