@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit, jit_inline, jit_inline_fused, jit_uncounted
@@ -27,6 +28,7 @@ from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.cases import Cases, first_depths
 from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.waves import series
 
 BLOCK = 32  # number of cells in a block
 WING = 4  # number of nodes on each side of a cell from which the finer nodes in the cell are interpolated
@@ -47,16 +49,33 @@ class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
     `height` is measured from the first node, which has the height `top` on the original line. `slope` is the rise per
-    cell. Both arrays begin with the last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of
-    the next period. `rise` is the height of the highest point above the first node. The highest point is in the cell
-    before the first node. On coarse grids, `rise` is 0.
+    cell. `ends` contains the results of `_ends_of` or is empty. The arrays `height`, `slope` and `ends` begin with the
+    last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. `rise` is the
+    height of the highest point above the first node. The highest point is in the cell before the first node. On coarse
+    grids, `rise` is 0.
     """
 
     height: FloatArray
     slope: FloatArray
+    ends: FloatArray
     blocks: FloatArray
     top: float
     rise: float
+
+
+def _ends_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
+    """Return corrections of the trapezium rule for the integrals of the height and of the squared slope.
+
+    The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
+    at node j. Corrections from local derivatives would miss the shortest waves, which are important for the integrals
+    over small contacts.
+    """
+    waves, slope = line.roughness.coefficients, line.nodes[1]
+    n = slope.size
+    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
+    factors = 1j * (1 / wave - 0.5 / np.tan(wave / 2))
+    squares = fft.rfft((slope / n) ** 2)
+    return series(waves * factors[: waves.size], n), fft.irfft(squares * np.append(0.0, factors), n)
 
 
 def nodes(line: RoughLine, first: int, stride: int) -> Nodes:
@@ -67,15 +86,24 @@ def nodes(line: RoughLine, first: int, stride: int) -> Nodes:
     height, slope = line.nodes
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
-    taken = Nodes(h, s, np.empty((n // BLOCK, 5)), float(height[first]), 0.0)
-    _write_nodes(height, slope, first, stride, taken)
+    ends = np.empty((2, h.size if stride == 1 else 0))
+    corrections = _ends_of(line) if stride == 1 else (ends[0], ends[1])
+    taken = Nodes(h, s, ends, np.empty((n // BLOCK, 5)), float(height[first]), 0.0)
+    _write_nodes(height, slope, corrections, first, stride, taken)
     return taken
 
 
 @jit
-def _write_nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, line: Nodes) -> None:
-    """Write the arrays of `line`."""
-    h, s, blocks = line.height, line.slope, line.blocks
+def _write_nodes(
+    height: FloatArray,
+    slope: FloatArray,
+    corrections: tuple[FloatArray, FloatArray],
+    first: int,
+    stride: int,
+    line: Nodes,
+) -> None:
+    """Write the arrays of `line`. The argument `corrections` contains the results of `_ends_of`."""
+    h, s, ends, blocks = line.height, line.slope, line.ends, line.blocks
     n = h.size - BEFORE - AFTER
     _write_periodic(height, first, stride, h)
     h -= line.top
@@ -85,10 +113,13 @@ def _write_nodes(height: FloatArray, slope: FloatArray, first: int, stride: int,
     else:
         s[1:-1] = 0.5 * (h[2:] - h[:-2])
         s[0], s[-1] = s[n], s[-1 - n]
+    if ends.size > 0:
+        _write_periodic(corrections[0], first, stride, ends[0])
+        _write_periodic(corrections[1], first, stride, ends[1])
     mean, square = np.empty(BLOCK), np.empty(BLOCK + 1)
     for j in range(blocks.shape[0]):
         begin = BEFORE + j * BLOCK
-        _integrals(h[begin - 1 :], s[begin - 1 :], BLOCK, mean, square)
+        _integrals(h[begin - 1 :], s[begin - 1 :], ends[0, begin - 1 :], ends[1, begin - 1 :], BLOCK, mean, square)
         peak, lowest, steepest, heights, squares = -np.inf, np.inf, np.inf, 0.0, 0.0
         for k in range(BLOCK):
             i = begin + k
@@ -115,13 +146,26 @@ def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatA
 
 
 @jit_uncounted
-def _integrals(h: FloatArray, s: FloatArray, cells: int, mean: FloatArray, square: FloatArray) -> None:
+def _integrals(
+    h: FloatArray,
+    s: FloatArray,
+    of_height: FloatArray,
+    of_square: FloatArray,
+    cells: int,
+    mean: FloatArray,
+    square: FloatArray,
+) -> None:
     """Write the integral of the height over each cell to `mean`, and the integral of the squared slope to `square`.
 
     The input arrays begin one node before the first cell. `square` needs one entry more than there are cells. The
-    trapezium rule is corrected by the Euler-Maclaurin formula, with derivatives from heights and slopes at neighbouring
-    nodes.
+    trapezium rule is corrected with `of_height` and `of_square`, the results of `_ends_of`. If `of_height` is empty,
+    the Euler-Maclaurin formula gives the corrections, with derivatives from heights and slopes at neighbouring nodes.
     """
+    if of_height.size > 0:
+        for k in range(cells):
+            mean[k] = 0.5 * (h[k + 1] + h[k + 2]) + of_height[k + 1] - of_height[k + 2]
+            square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + of_square[k + 1] - of_square[k + 2]
+        return
     for k in range(cells + 1):
         rise, fall = h[k + 2] - h[k], (h[k + 2] - h[k + 1]) - (h[k + 1] - h[k])
         tilt, bow = s[k + 2] + s[k], s[k + 2] - s[k]
@@ -155,13 +199,15 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     Each cell of the line is divided into ``weights.shape[1]`` cells of the tile.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
+    # the exact corrections in `ends` are known only at the nodes of the line, not at the nodes of a finer tile
+    here = first - 1 if refinement == 1 else line.ends.shape[1]
     if refinement == 1:
         h[: cells + 3] = line.height[first - 1 : first + cells + 2]
         s[: cells + 3] = line.slope[first - 1 : first + cells + 2]
     else:
         refine(line, first, cells, weights, h, s)
     cells *= refinement
-    _integrals(h, s, cells, tile[MEAN], tile[SQUARE])
+    _integrals(h, s, line.ends[0, here:], line.ends[1, here:], cells, tile[MEAN], tile[SQUARE])
     _peaks(h, s, cells, tile[TOP])
     return cells
 
@@ -223,12 +269,14 @@ COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENIN
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
-# Rows of the workspace of a sweep, which has one column for each case.
+ROWS = 15
+# Offset of each quantity of a case in the workspace of a sweep.
 # State: displacement (U), derivative of U with respect to the depth (FADE), and CONTACT (1 in contact, 0 if free).
 # Sums: load, stiffness (RATE), drag (LOSS), length in contact, and integral of the squared slope in contact (STRETCH).
 # Constants: depth, De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and U at the start of the period (BEGAN).
 # CALM is 1 if the current block is entirely in contact or entirely free.
-U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH, DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(15)
+U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
+DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 # Indices of the results of a case that are extrapolated over the last step of the depth
 DRAG, FRACTION, CONTACT_SLOPE = range(3)
 SECANTS = 3
@@ -349,10 +397,10 @@ def _contact_in_cell(
 @jit_uncounted
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     """Move one element of case k along a tile, and add the integrals over the tile to the sums of this case."""
-    d, r = workspace[DEPTH, k], workspace[DEBORAH, k]
-    decay, inverse = workspace[DECAY, k], workspace[INVERSE, k]
-    u, fade = workspace[U, k], workspace[FADE, k]
-    contact = workspace[CONTACT, k] > 0
+    d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
+    decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
+    u, fade = workspace[U + k], workspace[FADE + k]
+    contact = workspace[CONTACT + k] > 0
     load, rate, loss, length, stretch = 0.0, 0.0, 0.0, 0.0, 0.0
     free_load, free_rate, free_loss = 0.0, 0.0, 0.0
     i = 0
@@ -401,13 +449,13 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
         loss += 0.5 * (u * u * forgets * (1 + keeps) + w_stop * w_stop * loses * (1 + held))
         u, fade = w_stop * held, held
     lost = 1 - decay
-    workspace[U, k], workspace[FADE, k] = u, fade
-    workspace[CONTACT, k] = 1.0 if contact else 0.0
-    workspace[LOAD, k] += load + r * lost * free_load
-    workspace[RATE, k] += rate + r * lost * free_rate
-    workspace[LOSS, k] += loss + r * stretch + 0.5 * lost * (1 + decay) * free_loss
-    workspace[LENGTH, k] += length
-    workspace[STRETCH, k] += stretch
+    workspace[U + k], workspace[FADE + k] = u, fade
+    workspace[CONTACT + k] = 1.0 if contact else 0.0
+    workspace[LOAD + k] += load + r * lost * free_load
+    workspace[RATE + k] += rate + r * lost * free_rate
+    workspace[LOSS + k] += loss + r * stretch + 0.5 * lost * (1 + decay) * free_loss
+    workspace[LENGTH + k] += length
+    workspace[STRETCH + k] += stretch
 
 
 @jit_uncounted
@@ -422,31 +470,31 @@ def _pass_block(
     steepest /= refinement
     cells, heights, squares = BLOCK * refinement, block[HEIGHTS] * refinement, block[SQUARES] / refinement
     for k in range(count):
-        d, r, was = workspace[DEPTH, k], workspace[DEBORAH, k], workspace[CONTACT, k] > 0
-        u, fade, through = workspace[U, k], workspace[FADE, k], workspace[THROUGH, k]
+        d, r, was = workspace[DEPTH + k], workspace[DEBORAH + k], workspace[CONTACT + k] > 0
+        u, fade, through = workspace[U + k], workspace[FADE + k], workspace[THROUGH + k]
         kept, lost = u * through, 1 - through
         memory = r * lost
         is_free = (not was) & (peak + d <= kept)
         is_pressed = was & (lowest + d + r * steepest > 0)
-        load, rate, loss = workspace[LOAD, k], workspace[RATE, k], workspace[LOSS, k]
-        length, stretch = workspace[LENGTH, k], workspace[STRETCH, k]
+        load, rate, loss = workspace[LOAD + k], workspace[RATE + k], workspace[LOSS + k]
+        length, stretch = workspace[LENGTH + k], workspace[STRETCH + k]
         passed_load = load + u * memory if is_free else load
         free_rate = rate + fade * memory if is_free else rate
         free_loss = loss + 0.5 * u * u * lost * (1 + through) if is_free else loss
         kept = kept if kept > SMALL else 0.0
         free_load, faded = kept if is_free else u, fade * through if is_free else fade
-        workspace[LOAD, k] = load + (heights + cells * d) if is_pressed else passed_load
-        workspace[RATE, k] = rate + cells if is_pressed else free_rate
-        workspace[LOSS, k] = loss + r * squares if is_pressed else free_loss
-        workspace[LENGTH, k] = length + cells if is_pressed else length
-        workspace[STRETCH, k] = stretch + squares if is_pressed else stretch
-        workspace[U, k] = last + d if is_pressed else free_load
-        workspace[FADE, k] = 1.0 if is_pressed else faded
-        workspace[CALM, k] = 1.0 if is_pressed | is_free else 0.0
+        workspace[LOAD + k] = load + (heights + cells * d) if is_pressed else passed_load
+        workspace[RATE + k] = rate + cells if is_pressed else free_rate
+        workspace[LOSS + k] = loss + r * squares if is_pressed else free_loss
+        workspace[LENGTH + k] = length + cells if is_pressed else length
+        workspace[STRETCH + k] = stretch + squares if is_pressed else stretch
+        workspace[U + k] = last + d if is_pressed else free_load
+        workspace[FADE + k] = 1.0 if is_pressed else faded
+        workspace[CALM + k] = 1.0 if is_pressed | is_free else 0.0
     queued = 0
     for k in range(count):
         queue[queued] = k
-        queued += 0 if workspace[CALM, k] > 0 else 1
+        queued += 0 if workspace[CALM + k] > 0 else 1
     return queued
 
 
@@ -466,10 +514,10 @@ def sweep(
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
     for k in range(count):
-        w = workspace[DEPTH, k] + line.height[BEFORE - 1]
-        force = w + workspace[DEBORAH, k] / refinement * line.slope[BEFORE - 1]
-        workspace[U, k], workspace[FADE, k] = max(w, 0.0), 1.0
-        workspace[CONTACT, k] = 1.0 if w > 0 and force > 0 else 0.0
+        w = workspace[DEPTH + k] + line.height[BEFORE - 1]
+        force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
+        workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
+        workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
     # first the cell of the summit, where every case is in contact, then the blocks, then the cells after the last block
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
@@ -485,8 +533,9 @@ def sweep(
                 _walk(tile, walked, workspace, queue[q])
         if j == 0:
             for k in range(count):
-                workspace[BEGAN, k] = workspace[U, k]
-            workspace[LOAD:DEPTH] = 0.0
+                workspace[BEGAN + k] = workspace[U + k]
+            for k in range(LOAD, DEPTH):
+                workspace[k] = 0.0
         first += cells
         rest = BEFORE + n - first
         cells = BLOCK if rest > BLOCK else rest
@@ -495,9 +544,9 @@ def sweep(
 @jit
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write the constants of case k to the workspace. The argument `cells` is the number of cells in a block."""
-    workspace[DEPTH, k], workspace[DEBORAH, k] = depth, deborah
-    workspace[INVERSE, k] = min(1 / deborah, LARGE)
-    workspace[DECAY, k], workspace[THROUGH, k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
+    workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
+    workspace[INVERSE + k] = min(1 / deborah, LARGE)
+    workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
 
 
 @jit
@@ -521,7 +570,7 @@ def _search(
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    tile, workspace = np.empty((IN_A_TILE, cells + 3)), np.empty((15, LANES))
+    tile, workspace = np.empty((IN_A_TILE, cells + 3)), np.empty(ROWS * LANES)
     queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
     step_before, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
     for begin in range(0, loads.size, LANES):
@@ -538,18 +587,18 @@ def _search(
             kept = 0
             for k in range(count):
                 case = lanes[k]
-                depth = workspace[DEPTH, k] + rise
-                step = (loads[case] * n - workspace[LOAD, k]) / workspace[RATE, k]
+                depth = workspace[DEPTH + k] + rise
+                step = (loads[case] * n - workspace[LOAD + k]) / workspace[RATE + k]
                 size = abs(step) / depth
-                length, stretch = workspace[LENGTH, k], workspace[STRETCH, k]
-                now[DRAG], now[FRACTION] = workspace[LOSS, k], length / n
+                length, stretch = workspace[LENGTH + k], workspace[STRETCH + k]
+                now[DRAG], now[FRACTION] = workspace[LOSS + k], length / n
                 now[CONTACT_SLOPE] = n * math.sqrt(stretch / length) if length > 0 else 0.0
                 for j in range(SECANTS):
                     rate[j] = (1 - last[k, j] / now[j]) / step_before[k]
                     rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
                     if depth + step == depth and not math.isfinite(rate[j]):
                         rate[j] = 0.0
-                closes = abs(workspace[U, k] - workspace[BEGAN, k]) <= CLOSED * workspace[U, k]
+                closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
                 if size <= accuracy and abs(rate[DRAG] * step) <= accuracy and closes:
                     depths[case] = depth + step
                     for j in range(SECANTS):
@@ -560,7 +609,7 @@ def _search(
                 step_before[kept], lanes[kept] = ahead - depth, case
                 for j in range(SECANTS):
                     last[kept, j] = now[j]
-                load_case(workspace, kept, ahead - rise, workspace[DEBORAH, k], cells)
+                load_case(workspace, kept, ahead - rise, workspace[DEBORAH + k], cells)
                 kept += 1
             count = kept
 
