@@ -56,12 +56,11 @@ class PreparedLine(NamedTuple):
             self.known[deborah] = barriers_for(int(self.track.cells))
         return self.known[deborah]
 
-    def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the steady patches and the sums of `sweep_cells`. `depth` is the depth of the highest point."""
-        sums = np.empty(SWEEP_SUMS)
+    def patches(self, depth: float, deborah: float) -> tuple[Patches, float]:
+        """Return patches and drag in steady sliding at a depth below the mean line and a Deborah number v tau / L."""
+        depth, deborah, sums = depth + self.cells.top, deborah * self.track.cells, np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
-        pressed = _pressed(self.track, end, depth)
-        return Patches(start, end, pressed, depth, deborah), sums
+        return Patches(start, end, _pressed(self.track, end, depth), depth, deborah), float(sums[SWEEP_DRAG])
 
 
 class SteadyLimits(NamedTuple):
@@ -102,8 +101,8 @@ def steady_limits(
     """
     guess = None if guesses is None else guesses.ravel()
     steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)
-    depths, contacts, outcomes = (
-        each.reshape(-1, 2) for each in (steady.depth, steady.contact_fraction, steady.status)
+    drags, depths, contacts, outcomes = (
+        each.reshape(-1, 2) for each in (steady.drag, steady.depth, steady.contact_fraction, steady.status)
     )
     found, n = [], line.track.cells
     for k, load in enumerate(loads):
@@ -112,17 +111,16 @@ def steady_limits(
             no = np.nan
             found.append(SteadyLimits(no, no, no, no, no, np.full(2, no), None, None, np.full(2, no), False, outcome))
             continue
-        both, drags = [], []
-        for depth, speed in zip(depths[k], deborah[k] * n, strict=True):
-            patches, sums = line.patches(float(depth + line.cells.top), float(speed))
-            both.append(patches)
-            drags.append(float(sums[SWEEP_DRAG]))
-        fast = float(deborah[k, 1] * n)
-        at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
-        slower, outcome = both[int(np.argmin(deborah[k]))], Outcome(end)
-        is_full = both[0].start.size == both[1].start.size == 1  # free elements would be followed by a second patch
+        before, after = (float(each) for each in deborah[k])
+        first, drag = line.patches(float(depths[k, 0]), before)
+        slower, drag_after, is_full = first, float(drags[k, 1]), False
+        if after < before or first.start.size == 1:  # free elements would be followed by a second patch
+            last, drag_after = line.patches(float(depths[k, 1]), after)
+            slower, is_full = last if after < before else first, first.start.size == last.start.size == 1
+        fast = after * n
+        at, rate, tilt, end = _release(line.track, first, line.barriers(fast), fast, float(load * n))
         found.append(
-            SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], is_full, outcome)
+            SteadyLimits(drag, at, drag_after, rate, tilt, depths[k], first, slower, contacts[k], is_full, Outcome(end))
         )
     return found
 
