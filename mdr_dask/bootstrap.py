@@ -147,7 +147,8 @@ def chance(residuals: FloatArray, count: int) -> float:
     """Return the probability that scatter and errors alone cause at least the rms residual of the data.
 
     `residuals` is a stack of the differences between data and law. If the law holds, the residuals of the data (first
-    row) are about as large as the changes of the residuals in a resample. The result is NaN for too few resamples.
+    row) are about as large as the differences between these residuals and those of a resample. The result is NaN for
+    too few resamples.
     """
     caused = _caused(residuals, count)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan

@@ -27,7 +27,7 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures, and writes its command line into the tables of the figures."""
+    """A command that draws figures. The csv files with the data of the figures state the command line."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Store the command line in `context`, then parse the arguments."""

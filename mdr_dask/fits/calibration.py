@@ -129,7 +129,7 @@ class Calibration:
 
     @cached_property
     def best(self) -> FloatArray:
-        """Prediction in the cell of the highest density, shape (points,)."""
+        """Prediction for the most probable unknowns, shape (points,)."""
         place = self.posterior.places[self.posterior.best]
         best: FloatArray = self.prediction(place[None]).mean[0]
         return best

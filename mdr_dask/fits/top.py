@@ -24,7 +24,7 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The maximum of a parabola fitted to the points near the largest friction; every field is a stack.
+    """The maximum of a parabola fitted to the points near the largest friction, of the data and of all resamples.
 
     `height` is the maximum, corrected for the bias of the maximum. The interval of `height` includes the residuals of
     the parabola. `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum.

@@ -119,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for a condition. ``status == failed`` is true in every row with a failed result."""
+        """Return the values of a name in a condition. ``status == failed`` is true for rows with a failed result."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found

@@ -31,8 +31,8 @@ class Generated:
 
     `points` is the number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
     `length` is the circumference of a roller in m. `longest` is this length divided by the longest wavelength, and
-    `modes` is the length divided by the shortest wavelength. `roughness` is the Hurst exponent or the two surfaces. The
-    realisations use the files of a surface in turn.
+    `modes` is the length divided by the shortest wavelength. `roughness` is the Hurst exponent or the two surfaces. If
+    a measured surface has several files, the realisations use these files in turn.
     """
 
     points: tuple[int, ...]

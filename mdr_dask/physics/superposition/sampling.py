@@ -34,8 +34,8 @@ DIFFERENCE = 1e-3
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
-    For each pair of neighbouring curves, many values of the step between their two shifts are tried. The mean and
-    the variance of the step, weighted with the density of the pair, are then combined with the prior of the shifts.
+    For each pair of neighbouring curves, many values of the step between their two shifts are tried. Their
+    probabilities give the mean and the variance of the step, which are then combined with the prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, 81)  # in widths of the wider of the two curves
     means, variances = [], []

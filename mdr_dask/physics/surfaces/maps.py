@@ -20,7 +20,9 @@ Order = Literal["none", "mean", "plane", "parabola"]
 MOST_MISSING = 0.05  # largest accepted fraction of missing points
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
 SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest ring may be due to rounding
-MOST_SCATTER = 0.02  # an octave is used if scatter alone gives a squared angular harmonic of at most this, on average
+MOST_SCATTER = (
+    0.02  # an octave with few waves is left out: the squared harmonic that scatter alone would give exceeds this
+)
 BY_SCATTER = 4.0  # a squared harmonic due to scatter exceeds this many times its mean with probability exp(-4) = 2 %
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 

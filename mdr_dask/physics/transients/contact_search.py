@@ -278,7 +278,7 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
     A cell is skipped if the gap between free elements and line is so wide that the line cannot have met these elements
     since they separated. The gap is computed from a lower bound of the displacement. This bound begins with the last
-    known displacement and decays towards the least drift.
+    known displacement and approaches the least drift (a displacement, see `free_recovery`).
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, lift = now.track, work.recovery.bounds, search.lift

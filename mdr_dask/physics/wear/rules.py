@@ -155,7 +155,7 @@ def _rise(rule: Rule, gap: float) -> float:
 
 @jit_inline
 def _change(rule: Rule, gap: float) -> float:
-    """Return g - g0 at c + gap."""
+    """Return the change g - g0 of the image at the radius c + `gap`."""
     rise = _rise(rule, gap)
     if rule.rest == 0.0:
         return rule.eta - rise

@@ -104,7 +104,7 @@ class SlipMoment(Moment):
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip:
-    """Slip s = (f - f_star) / eta outside the stick border b.
+    """Partial slip: outside the stick border b, the slip at height f of the worn profile is s = (f - f_star) / eta.
 
     If the border passes a radius when the depth is d1, the image there is g = d1 - eta from then on. At the depth d,
     f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While the plateau rises
@@ -345,7 +345,7 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @jit
 def _known(mesh: Mesh, body: VirginBody, past: Past, place: Place) -> FloatArray:
-    """Return the contributions that are described in `PartialSlip.memory`, one after the other."""
+    """Return the contributions described in `PartialSlip.memory` in one array."""
     nodes, path, is_still = past.worn.shape[1], past.path, past.frozen == past.frozen
     result = np.empty(2 * nodes + 1)
     border, depth = path[0, -1], path[1, -1]
