@@ -25,11 +25,12 @@ class Revolution:
     """Intimate contact during one revolution of the rollers.
 
     A window is the part of both lines that is in the Hertzian contact at one instant. The windows are equidistant in
-    time. `contact` times `unit` is the length in intimate contact in each window, in m. `parts` is the number of equal
-    parts into which the revolution is divided.
+    time, and their distance on the lines is `stride` points. `contact` times `unit` is the length in intimate contact
+    in each window, in m. `parts` is the number of equal parts into which the revolution is divided.
     """
 
     contact: NDArray[np.int32] | IntArray
+    stride: int
     unit: float
     parts: int
 
@@ -56,7 +57,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
     """Find the intimate contact during one revolution. `lines` are the splines of both lines, shape (2, points)."""
     case, points = operation.case, lines.shape[1]
     spacing, creep = operation.source.length / points, case.slide_roll_ratio
-    width = operation.width / spacing
+    width, stride = operation.width / spacing, 1
     if creep == 0:
         clusters = find_clusters(lines.sum(axis=0), operation.film / operation.scale, spacing, operation.strength)
         contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width)
@@ -65,7 +66,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
         stride = max(1, int(operation.width / operation.source.length * operation.source.points[0] / WINDOWS))
         contact = _windows(operation, lines, np.arange(0, points, stride))
     parts = max(1, min(PARTS, int(operation.source.length / (2 * operation.width))))
-    return Revolution(contact, spacing / breakthrough.PARTS, parts)
+    return Revolution(contact, stride, spacing / breakthrough.PARTS, parts)
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
@@ -111,8 +112,8 @@ def drawn(
         contact = revolution.contact[travels] if whole else _windows(operation, lines, travels)
         found["contact_length_trace"] = np.asarray(contact * revolution.unit, dtype=np.float64)
     if {"upper_profile", "lower_profile"} & set(wanted):
-        travels = np.linspace(0, points, revolution.contact.size, endpoint=False)[[np.argmax(revolution.contact)]]
-        starts = breakthrough.creep_positions(travels, points, case.slide_roll_ratio)
+        travel = revolution.stride * int(np.argmax(revolution.contact))
+        starts = breakthrough.creep_positions([travel], points, case.slide_roll_ratio)
         half_width = float(operation.contact.half_width)
         x = POSITIONS * half_width
         nodes = (x + half_width) / operation.source.length * points

@@ -31,7 +31,7 @@ def shear_stress(
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
     exponent = np.minimum(log_viscosities(pressure, case.liquid), 600.0)  # a larger exponent could overflow
-    newtonian = slope * np.exp(exponent) / film
+    newtonian: FloatArray = slope * np.exp(exponent) / film
     return newtonian if eyring_stress is None else eyring_stress * np.arcsinh(newtonian / eyring_stress)
 
 
