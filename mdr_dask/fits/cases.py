@@ -16,7 +16,7 @@ from mdr_dask import bootstrap
 from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fitted, excludes, fitted, require, verdict
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fitted, excludes, fitted, require, undetermined, verdict
 
 Series = Mapping[str, xr.Dataset]
 Variables = dict[str, xr.Variable]
@@ -167,7 +167,8 @@ def nonlinear(
         return residuals
 
     best: OptimizeResult = least_squares(misfit, stated, method="lm")
-    solve = -np.linalg.pinv(best.jac).T
+    # an undetermined constant keeps its value in all rows, because a small residual would change it without limit
+    solve = -np.linalg.pinv(np.where(undetermined(best.jac), 0.0, best.jac)).T
 
     def fit(rows: FloatArray) -> FloatArray:
         constants: FloatArray = best.x + (rows - model(np.broadcast_to(best.x, (len(rows), stated.size)))) @ solve

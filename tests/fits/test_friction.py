@@ -5,6 +5,7 @@ from friction_store import store
 from mdr_dask import bootstrap
 from mdr_dask.errors import FitError
 from mdr_dask.fits import available, friction, top
+from mdr_dask.fits.cases import nonlinear
 from mdr_dask.fits.indenter import within_indenter_law
 from mdr_dask.physics.sliding import laws
 
@@ -36,6 +37,21 @@ def test_the_interpolation_law_holds_as_stated(forces):
     found = FIT["interpolation"]({"": forces})
     assert np.all(found["rms_error"] <= found["rms_error_stated"] + 1e-9)
     assert np.all(found["rms_error_stated"] < 0.16)  # 11 % for long lines, and the scatter of 12 short lines
+
+
+def test_an_exponent_without_influence_is_not_determined():
+    """At high forces the fit lowers the third law without limit; the other results stay finite."""
+    force, velocity = (axis.ravel() for axis in np.meshgrid([1.0, 15.0, 200.0], np.geomspace(0.01, 10, 12)))
+    law = np.log(laws.interpolation(force, velocity, -40.0, 1.7))
+    scatter = np.random.default_rng(5).normal(0, 1e-2, (1 + bootstrap.RESAMPLES, force.size))
+
+    def model(constants):
+        return np.log(laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:])))
+
+    found, results = nonlinear(model, np.array([0.4, np.log(1.6)]), law + scatter, 10, str)
+    assert np.all(np.isnan(found.constants[:, 0]))
+    assert np.all(np.isfinite(found.constants[:, 1]))
+    assert float(results["rms_error"]) < 0.02
 
 
 def test_plateau_lies_near_root_two(forces):
