@@ -46,7 +46,7 @@ def write(rows: Iterable[Row], path: Path) -> None:
     rows = list(rows)
     solvers = {row.solver for row in rows}
     kept = [row for row in read(path) if row.solver not in solvers] if path.exists() else []
-    today = f"{date.today()}, version {__version__}"
+    today = f"{date.today()} (version {__version__})"
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(Row._fields)
@@ -75,7 +75,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def dated(rows: Iterable[Row], text: str) -> str:
     """Return a text below the dates of the rows."""
-    return f"Measured {' and '.join(sorted({row.measured for row in rows}))}.\n\n{text}"
+    return f"Measured on {' and '.join(sorted({row.measured for row in rows}))}.\n\n{text}"
 
 
 def with_tables(page: str, tables: Mapping[str, str]) -> str:
