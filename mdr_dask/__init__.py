@@ -1,6 +1,6 @@
 """A distributed parameter-study runner for tribology with the method of dimensionality reduction.
 
-A public name is imported at the first use of the name. Importing the package is therefore quick.
+Each public name is imported at its first use, so that importing the package is quick.
 """
 
 from importlib import import_module

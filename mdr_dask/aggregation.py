@@ -22,8 +22,8 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 class Statistic:
     """One reduction over ``realisation``: a name, a meaning and a function that computes the reduction.
 
-    The function takes an output and the companion of the output (None if missing). If the statistic cannot be computed
-    without a companion, the function returns None.
+    The function takes an output and its companion, or None if the output has no companion. The function returns None
+    if it needs a companion and there is none.
     """
 
     name: str
@@ -87,11 +87,12 @@ def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.D
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the ends of the 95 % intervals of means, shape (..., 2).
 
-    The last axis of `values` contains `count` realisations and, if known, the discretisation error of the mean.
+    The last axis of `values` contains the values of `count` realisations, and then the discretisation error of the mean
+    if it is known.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
-    step = 2**20 // bootstrap.RESAMPLES  # saves memory
+    step = 2**20 // bootstrap.RESAMPLES  # number of rows in one step, limited to save memory
     for start in range(0, len(flat), step):
         rows = flat[start : start + step].T
         stack = bootstrap.means(rows[:count])
@@ -144,7 +145,7 @@ STATISTICS = (
         lambda _, error: None if error is None else grid_error(error),
     ),
     Statistic("quantile", "quantiles over realisations", lambda array, _: quantiles(array)),
-    Statistic("interval", "95 % interval of the mean over realisations, discretisation included", interval),
+    Statistic("interval", "95 % interval of the mean over realisations, with discretisation errors", interval),
     Statistic("count", "number of realisations that succeeded", lambda array, _: count(array)),
 )
 NAMES = tuple(statistic.name for statistic in STATISTICS)

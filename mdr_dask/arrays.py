@@ -1,4 +1,4 @@
-"""Type names of arrays, and the random numbers of a realisation."""
+"""Short names for types of arrays, and the random generator of a realisation."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ BoolArray = NDArray[np.bool_]
 
 
 def random_stream(seed: int, realisation: int) -> np.random.Generator:
-    """Return the random generator of a realisation, which is the same for all cases and all models."""
+    """Return a generator that gives a realisation the same random numbers in every case and every model."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))

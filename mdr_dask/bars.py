@@ -24,7 +24,7 @@ Draw = Callable[["Progress | None", float, float], None]
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that receives the progress of a run, and regularly show the latest progress."""
+    """Yield a function that receives the progress of a run. The latest progress is shown at regular intervals."""
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:
@@ -121,7 +121,7 @@ def _write(line: str) -> None:
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
 
-    The remaining time counts down until the next block ends. A remaining time of zero is not shown.
+    Between the ends of two blocks, the remaining time counts down. A remaining time of zero is not shown.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

@@ -52,13 +52,13 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values; a realisation (first axis) with a value that is not finite becomes NaN in all values."""
+    """Return the values; if a realisation (first axis) has a value that is not finite, all values in it become NaN."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return two rows for each group of neighbouring values: the group is shifted up in one row, and down in the next.
+    """Return two copies of all values for each group of neighbours, with this group shifted up or shifted down.
 
     A value is shifted by the error of this value. If the error is infinite, the value is shifted by its absolute value.
     """

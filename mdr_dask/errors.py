@@ -71,7 +71,7 @@ _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the most similar known word. If no word is similar, name all known words if there are few."""
+    """Return a hint with the most similar known word, or else a list of the known words if there are at most 12."""
     return similar(word, known) or (f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else "")
 
 

@@ -59,7 +59,7 @@ _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
 
 @dataclass(frozen=True)
 class Column:
-    """A column that a table may contain under the given name, a synonym in `SYNONYMS`, or one of `other_names`.
+    """A column that a table may contain under its `name`, a synonym in `SYNONYMS`, or one of `other_names`.
 
     The SI `unit` is ``"1"`` for pure numbers. In SI, all values must be greater than `above` and at least `least`.
     `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of this
@@ -96,7 +96,7 @@ def _key(name: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _names_of(name: str) -> list[str]:
-    """Return a name and all its synonyms. If `SYNONYMS` lacks the name, the words in `IGNORED` are ignored."""
+    """Return a name and its synonyms. If `SYNONYMS` lacks the name, search again without the words in `IGNORED`."""
     lines = [line for line in SYNONYMS if plain(name) in map(plain, line)]
     lines = lines or [line for line in SYNONYMS if _key(name) in map(_key, line)]
     return [name, *(each for line in lines for each in line)]
@@ -118,9 +118,9 @@ def is_called(heading: str, name: str, *others: str) -> bool:
 
 
 def nearest(heading: str, names: Sequence[str]) -> str:
-    """Return a hint with a name that is similar to a heading, or else with a name that contains a word of the heading.
+    """Return a hint with a name that is similar to a heading, or else with a name that has a word of the heading.
 
-    The hint is empty if there is no such name.
+    The word may also be in a synonym of the name. The hint is empty if there is no such name.
     """
     words = {word for word in plain(heading).split() if len(word) > 2}
     common = [name for name in names if any(words & set(plain(each).split()) for each in _names_of(name))]
@@ -130,8 +130,8 @@ def nearest(heading: str, names: Sequence[str]) -> str:
 def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading such as ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    Text in square brackets is always a unit. Any other text must look like a unit. In ``force (F)``, F is the symbol of
-    the force and not a unit.
+    Text in square brackets is always a unit. Elsewhere, a text is a unit only if it looks like one. In ``force (F)``, F
+    is the symbol of the force and not a unit.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -161,7 +161,7 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             return alike[0], unit
     if found := exact or synonyms or ([] if unit else others):  # the unit is wrong or missing
         return found[0], unit
-    # synonyms of `other_names` count only if the name is one word, and the unit fits only one of their columns
+    # synonyms of `other_names` count only if the name is one word, and the unit fits only one column with such a name
     quantities = {line[0] for line in SYNONYMS} if " " not in plain(name) else set()
     short = [each for each in columns if any(is_called(name, other) for other in quantities & set(each.other_names))]
     if len(agreeing := [column for column in short if _agrees(unit, column)]) == 1:

@@ -20,17 +20,18 @@ from mdr_dask.errors import CampaignError, ModelError
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations of a block of a large study. Such a block takes about a second to compute, and only milliseconds
-#: to schedule and write.
+#: Number of operations that a block of a large study should have. Such a block takes about a second to compute, and
+#: only milliseconds to schedule and write.
 OPERATIONS = 1e9
-#: A small study is cut into about `FEW_BLOCKS` blocks for several workers. A block has at least `LEAST` operations.
+#: A small study is cut into about `FEW_BLOCKS` blocks, so that several workers can share it. If possible, a block has
+#: at least `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
-#: Blocks whose cases share work are always halved if they need more operations than this.
+#: Blocks whose cases share a part of the computation are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
 #: Blocks with fewer operations than `MOST_SHARED` are halved only if the halving multiplies the total number of
 #: operations by less than this factor.
 REPEATED_WORK = 1.15
-#: Largest number of blocks of a series whose operations are counted, so that `check` is fast.
+#: The operations of at most this number of blocks of a series are counted, so that `check` is fast.
 SAMPLED = 1000
 #: Largest number of records in one file. A file with this number of records has about a megabyte.
 RECORDS_TOGETHER = 1000
@@ -82,7 +83,7 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes on some values of every axis. If the series has no axis, notes on the parameters."""
+        """Notes for the user on the parameters, collected for some values of every axis."""
         base = self.series.parameters
         sets = [with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some] or [base]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -121,7 +122,7 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the approximate operations of a block, from a count for its cases and the first realisations."""
+        """Return the approximate number of operations of a block, counted for its cases and the first realisations."""
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
         first, known = (*cases, 0), self._known
@@ -130,7 +131,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the operations of a block. If the model counts none, assume that N results need sqrt(N) blocks."""
+        """Return the operations of a block; if the model cannot count them, assume sqrt(N) blocks for N results."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)
@@ -226,7 +227,7 @@ class Estimate:
 def templates(
     campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
 ) -> tuple[Template, ...]:
-    """Lay out every series of a campaign; raise CampaignError if a series has too many results or needs too much
+    """Return the template of every series. Raise CampaignError if a series has too many results or needs too much
     memory.
 
     `stored_chunks` contains the chunk lengths of the series that are already in the store.

@@ -36,8 +36,8 @@ COMPARED = (0.0, 0.25, 0.5, 0.75)
 class Mean(NamedTuple):
     """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
-    # Along the first axis: the means over all realisations, then the means without each group of realisations. The
-    # other axes are the cases. A case without a successful realisation is NaN.
+    # Along the first axis: the means over all realisations, then, for each group of realisations, the means without
+    # this group. The other axes are the cases. A case without a successful realisation is NaN.
     groups: FloatArray
     # Shape (cases...): discretisation error of the mean of each case, 0 for an unknown error.
     error: FloatArray
@@ -56,7 +56,7 @@ class Mean(NamedTuple):
     def lines(self, cases: tuple[NDArray[np.intp], ...], number: int) -> Mean:
         """Return the means of some cases as a table, in which each row is a line along the axis with index `number`.
 
-        `cases` is the result of `numpy.ix_`.
+        `cases` is an index of the cases, made by `numpy.ix_`.
         """
         groups = np.moveaxis(np.stack([group[cases] for group in self.groups]), number + 1, -1)
         error = np.moveaxis(self.error[cases], number, -1)
@@ -78,8 +78,8 @@ class Mesh:
     series: Series
     # For each adaptive axis (key: its index in the series), the positions of its values, from 0 to 1.
     shares: Mapping[int, FloatArray]
-    # Mask of the needed cases. The dimensions are the axes of the series. Each combination of values of the
-    # non-adaptive axes needs certain values of every adaptive axis, in all combinations.
+    # Mask of the needed cases. The dimensions are the axes of the series. For each combination of values of the
+    # non-adaptive axes, certain values of every adaptive axis are needed, in all combinations.
     cases: BoolArray
 
     @classmethod
@@ -122,7 +122,7 @@ class Stage:
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether the study may choose more values."""
+        """Whether a series has an adaptive axis."""
         return any(mesh.shares for mesh in self.meshes)
 
     def after(self, meshes: tuple[Mesh, ...]) -> Stage | None:
@@ -157,8 +157,8 @@ class _Interval:
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
-    `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, the number of
-    combinations of non-adaptive values that miss the tolerance although no interval of the combination may be halved.
+    `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, how many
+    combinations of values of the other axes miss the tolerance although none of their intervals may be halved again.
     """
     found, short = mesh, {}
     for number in mesh.shares:
@@ -173,7 +173,7 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve, the widest first. One discontinuity therefore does not use up all values."""
+    """Return the intervals to halve. The widest are first, so that one discontinuity does not use up all values."""
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
     chosen = []
@@ -250,7 +250,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     """Return the interpolation error of each interval, shape (lines, values - 1).
 
     Let n be the higher of the levels at the two ends of an interval. The output in the interval is predicted from all
-    values of lower levels, once by a monotone cubic and once by a cubic spline. The error is the largest difference
+    values at levels below n, once by a monotone cubic and once by a cubic spline. The error is the largest difference
     between the predictions and the monotone cubic through all values, minus an allowance for the scatter of the
     realisations and the discretisation errors. The result may be negative.
 

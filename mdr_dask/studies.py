@@ -60,7 +60,7 @@ def read(source: Source) -> Campaign:
 
 
 def check(source: Source) -> Summary:
-    """Check a campaign, and summarise the results and the costs of the campaign.
+    """Check a campaign without running it, and return the number of its results and its costs.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def run(
     resources : Resources, optional
         Threads, processes, a scheduler or a cluster; the default is all cores of this machine.
     retry_failed : bool
-        Whether to compute failed and not converged cases again.
+        Whether to compute cases again if they failed or did not converge.
 
     Returns
     -------
@@ -144,9 +144,8 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     -------
     Dataset or DataTree
         The outputs, with units and errors, and ``status``. The axes and ``realisation`` are dimensions of these arrays.
-        A campaign with series gives a DataTree with a node for each series. An array is read at the first use of the
-        array. The attribute ``complete`` is False as long as results are missing. Means are then taken over the
-        available results.
+        A campaign with series gives a DataTree with a node for each series. An array is read when it is first used.
+        While results are missing, the attribute ``complete`` is False, and means are taken over the available results.
 
     Raises
     ------
@@ -190,7 +189,7 @@ def aggregate(
     Returns
     -------
     Dataset
-        A variable ``<output>_<statistic>`` for every output and statistic, and ``state_counts``.
+        A variable ``<output>_<statistic>`` for every output and statistic, and the number of results in each state.
     """
     parts = (_several(select), where, _several(group_by), (), _several(columns), units or {})
     asked = Question(_several(outputs), *parts, _several(statistics))
@@ -351,7 +350,7 @@ def master_curve(
     Returns
     -------
     Dataset
-        The shift factors, the merged curve with the error of this curve, and the constants of the laws for the factors.
+        The shift factors, the merged curve with its error, and the constants of the laws fitted to the factors.
     """
     from pandas import DataFrame
 

@@ -1,4 +1,4 @@
-"""Describe the results and the costs of a campaign before it is run, as text and as JSON, for ``mdr-dask check``."""
+"""Describe the size and the costs of a campaign before it is run, as text and as JSON, for ``mdr-dask check``."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from mdr_dask.models.base import unit_of
 from mdr_dask.plan import Estimate, estimate
 from mdr_dask.units import seconds, shown
 
-#: Largest number of values of an axis that are all printed.
+#: An axis with at most this number of values is printed with all its values.
 LISTED = 6
 
 
 @dataclass(frozen=True, repr=False)
 class Summary(Estimate):
-    """The results and the costs of a campaign. ``print`` shows the text of ``mdr-dask check``.
+    """The size and the costs of a campaign. ``print`` shows the text of ``mdr-dask check``.
 
-    `lines` are the axes of each series, notes, and costs. `questions` are questions about numbers without a unit.
+    `lines` is the text about the axes of each series, the notes and the costs. `questions` ask about numbers without a
+    unit.
     """
 
     lines: tuple[str, ...] = ()
@@ -52,15 +53,16 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
             unit = units.get(axis.path, axis.unit or "1")
             yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit, written.get(axis.name, ''))}"
     if defaults := _defaults(campaign):
-        yield f"  not given: {', '.join(defaults)}"
+        yield f"  defaults used: {', '.join(defaults)}"
     yield from (f"  {note}" for note in costs.notes)
     yield from (f"  {line}" for line in cost_lines(costs))
 
 
 def _defaults(campaign: Campaign) -> list[str]:
-    """Return names and values of parameters not given, if the default has an effect and is not zero, false or empty.
+    """Return the names and defaults of the parameters that the campaign does not give.
 
-    If only some series use a default value, the names of these series follow in brackets.
+    Defaults that have no effect, or that are zero, false or empty, are left out. If only some series use a default, the
+    names of these series follow in brackets.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:
@@ -151,7 +153,7 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return the costs of a study by names that users read from JSON: do not change the names."""
+    """Return the costs of a study for JSON. Programs of users read these keys: do not change the keys."""
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,

@@ -32,7 +32,7 @@ SEPARATORS = ("\t", ";", "|", ",", BLANKS)
 SHEET = "# sheet of a workbook: "
 #: Measured values count as equal up to this relative difference. Instruments print three digits.
 AGREE = 0.01
-#: A table without names and with more columns than this is a map.
+#: A table without names and with more columns than this is described as a map.
 MOST_COLUMNS = 6
 NO_ROWS = "expected a line of names and at least one line of values"
 
@@ -54,7 +54,7 @@ _MISSING = re.compile(
 _WORD = re.compile(r"(?!inf|nan)[^\W\d]{2}", re.IGNORECASE)
 
 Cells = NDArray[np.object_]
-#: The `Column` of a column of a table, its unit, and whether its entries are common logarithms.
+#: The meaning of a column of a table: its `Column`, its unit, and whether its entries are common logarithms.
 Meaning = tuple[Column | None, str, bool]
 
 
@@ -160,7 +160,7 @@ def _workbook(content: bytes, source: str) -> str:
 
 
 def decimal_marks(texts: Sequence[str]) -> str:
-    """Return the decimal marks with which all texts are numbers: ``,`` for ``30,0``, but ``.,`` for ``3,158``."""
+    """Return the decimal marks with which all texts are numbers: ``,`` for ``30,0``, and both for ``3,158``."""
     return "".join(mark for mark, form in _DECIMALS.items() if all(map(re.compile(form).fullmatch, texts)))
 
 
@@ -521,8 +521,8 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
     """Return, for each column of the sheet, its `Column`, its unit, and whether its entries are common logarithms.
 
     The `Column` is one of `columns`, or None for an unknown column of the sheet. In a sheet without names, `columns`
-    describes the columns of the sheet in order. If no name in the sheet means a needed `Column`, an unknown column
-    with its dimension is taken. This requires that no second unknown column and no second `Column` has this dimension.
+    describes the columns of the sheet in order. If no name in the sheet means a needed `Column`, an unknown column of
+    the same dimension is taken, unless a second unknown column or a second `Column` has this dimension.
     """
     if not sheet.names:
         count = len(sheet.units)

@@ -288,7 +288,7 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return the names of the processor and the libraries. The last digits of results may depend on these names."""
+    """Return a text with the processor and the libraries, on which the last digits of results may depend."""
     if KIND in os.environ:
         return os.environ[KIND]
     from importlib.metadata import version

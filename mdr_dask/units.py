@@ -143,7 +143,7 @@ COMMON = (
 def to_si(value: str, unit: str) -> float:
     """Convert a number with its unit, such as ``"20 mm"``, to the SI unit `unit`, or raise ValueError.
 
-    A number without a unit is in SI. Units that are powers of ten cause no rounding error, so ``"1.1 mm"`` is 0.0011.
+    A number without a unit is in SI. A factor that is a power of ten causes no rounding error: ``"1.1 mm"`` is 0.0011.
     """
     match = _QUANTITY.match(value)
     if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):

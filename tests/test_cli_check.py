@@ -157,7 +157,7 @@ def test_check_names_the_defaults_that_have_an_effect(capsys):
         "  cycles: [1, 2]\n  wear_rule: exact\n"
     )
     assert main(["check", "gear.yaml", "ball.yaml"]) == 0
-    gear, ball = (line for line in capsys.readouterr().out.splitlines() if "not given: " in line)
+    gear, ball = (line for line in capsys.readouterr().out.splitlines() if "defaults used: " in line)
     for text in ("oil = mobilgear_shc_xmp_320", "roller_radius = 50 mm"):
         assert text in gear
     assert "roller_width" not in gear

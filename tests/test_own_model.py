@@ -71,7 +71,7 @@ def test_the_second_example_of_the_page_has_a_profile_and_a_data_file(example, c
     assert main(["show", "results/track.zarr", "--columns", "passes"]) == 0
     assert main(["plot", "results/track.zarr", "worn_depth", "--over", "place", "-o", "track.png"]) == 0
     assert main(["report", "results/track.zarr", "-o", "track.html"]) == 0
-    assert "in the module track, which is not packed" in Path("track.html").read_text()
+    assert "in the module track, which is not included" in Path("track.html").read_text()
     (example / "p.csv").write_text("x,p\n0,0\n0.02,2e6\n")
     assert main(["run", "track.yaml", "--quiet"]) == 2
     assert "pressure" in capsys.readouterr().err

@@ -29,7 +29,7 @@ _HEAD = """\
 name: {name}
 model: {model}
 seed: 1
-realisations: 1                     # samples of each case with other random numbers; for a mean, 20 or more
+realisations: 1                     # samples of each case, with different random numbers; for a mean, 20 or more
 # sampling: zip                     # or {{sobol: 100}}, {{latin_hypercube: 100}}, {{table: cases.csv}}; default: a grid
 # accuracy: 1 %                     # error allowed for the outputs
 

@@ -71,7 +71,7 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the name and the value of each field of a parameter set that has only one possible value."""
+    """Return the name and the value of each field that has only one possible value."""
     return {
         key: get_args(info.annotation)[0]
         for key, info in kind.model_fields.items()

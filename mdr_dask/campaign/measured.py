@@ -201,7 +201,7 @@ def require_readable(table: DataFile, model: str, outputs: Sequence[str], series
 def _readings(
     table: DataFile | None, model: str, outputs: Sequence[str], series: Sequence[Series]
 ) -> Iterator[tuple[Series, Measured | DataError]]:
-    """Yield each series with its measured points, or with the error that the table does not fit the series."""
+    """Yield each series with its measured points, or with the error that explains why the table does not fit."""
     for one in series if table else ():
         assert table is not None
         try:

@@ -42,7 +42,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
-        # other messages name the missing entries of a list, or the mistakes in a mapping that could also be a word
+        # a list or mapping gets no message of its own if other messages name the mistakes inside it
         if inside and group[0]["type"] in ("too_short", "literal_error"):
             continue
         _report_group(path, group, kind, data, report)

@@ -101,7 +101,7 @@ def _model(document: Document, spec: CampaignSpec) -> Model[Any] | None:
 
 
 def with_hint(error: ModelError, name: str) -> str:
-    """Return a message with a hint: the known model with the nearest name, or the documentation of own models."""
+    """Return a message with a hint: the most similar name of a known model, or the page on writing a model."""
     is_unknown = str(error).startswith("unknown")
     return f"{error}{did_you_mean(name, models.names()) if is_unknown else ' (see docs/own-model.md)'}"
 

@@ -154,7 +154,7 @@ class CampaignSpec(Parameters):
     model: str = Field(description="name of the model that computes the results")
     seed: Whole = Field(0, ge=0, description="seed of all random numbers; the same seed gives the same results")
     realisations: Realisations = Field(
-        1, description="number of random samples of each case, such as independent rough lines of the same statistics"
+        1, description="number of random samples of each case, such as independent rough lines with the same statistics"
     )
     parameters: dict[str, Any] = Field(
         description="parameters of the model. A list, {linear: [a, b, n]}, {geometric: [a, b, n]} or {values: [...]} "
@@ -176,7 +176,7 @@ class CampaignSpec(Parameters):
     )
     outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
         None,
-        description="outputs to compute; without this key, all outputs that the table of the model marks as default",
+        description="outputs to compute; without this key, the default outputs of the model",
     )
     errors: bool = Field(
         True,

@@ -73,7 +73,7 @@ def _parameter(row: dict[str, str]) -> str:
 
 
 def _output(row: dict[str, str]) -> str:
-    """Return the meaning, unit and dimensions of an output, and perhaps ``only if requested`` and ``with error``."""
+    """Return the meaning, unit and dimensions of an output, and whether it is optional and has an error."""
     along = row["dimensions"] and f"along {row['dimensions']}"
     missing = "" if row["default"] == "yes" else "only if requested"
     return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))

@@ -41,8 +41,8 @@ PARTS = ("factors", "curve", "points")
 @click.option(
     "--vertical",
     type=click.Choice(["none", "modulus", "compliance", "free"]),
-    help="Factors of the ordinate. modulus, compliance (the default for these quantities): the known factor b_T and an "
-    "unknown offset of some per cent; free: unknown factors; none: no factors.",
+    help="Vertical factors of the curves. modulus or compliance: the known factor b_T and an unknown offset of some "
+    "per cent (the default for these quantities); free: unknown factors; none: no factors.",
 )
 @click.option(
     "--reference",

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     metavar="SECONDS",
     help="Time limit of a case; a case that takes longer is recorded as failed.",
 )
-@click.option("--retry-failed", is_flag=True, help="Compute failed and not converged cases again.")
+@click.option("--retry-failed", is_flag=True, help="Compute cases again if they failed or did not converge.")
 @click.option(
     "--log", type=click.Path(dir_okay=False, path_type=Path), help="Append the events of the run to FILE as JSON lines."
 )

@@ -20,7 +20,7 @@ from mdr_dask.questions.expression import ALTERNATIVES, Find, Value, evaluate, p
 
 #: Names of two columns: the state of a row, and the number of results in this row that are done.
 STATUS, REALISATIONS = "status", "realisations"
-#: Name of the variable with the number of results in each state. Only averages over cases have this variable.
+#: Name of the variable with the number of results in each state. Stores lack it; averages over cases have it.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -119,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return the values of a name in a condition. ``status == failed`` is true for rows with a failed result."""
+        """Return a column for use in a condition; ``status == failed`` is true for rows with any failed result."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found

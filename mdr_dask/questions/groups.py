@@ -1,4 +1,4 @@
-"""Averages over groups of cases. The cases of a group have the same values along some axes."""
+"""Averages over groups of cases. All cases of a group have the same values of the chosen axes."""
 
 from __future__ import annotations
 

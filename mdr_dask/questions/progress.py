@@ -42,7 +42,7 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the last message about each result of a series. Messages about a previous state are left out."""
+    """Return the last message about each result of a series. Messages about earlier states are left out."""
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
@@ -94,7 +94,7 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return the only unit that the campaign file uses for each SI unit, and degC for K if the file has none for K."""
+    """Map each SI unit to its unit in the campaign file, unless there are several. K becomes degC by default."""
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():

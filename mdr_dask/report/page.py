@@ -174,7 +174,7 @@ def _figures(url: str, model: str, groups: Mapping[str, xr.Dataset], left_out: l
 
 
 def _svg(figure: Any) -> bytes:
-    """Return a figure as SVG. Two decimals of a point suffice for the coordinates of paths, and keep the page small."""
+    """Return a figure as SVG. To keep the page small, coordinates of paths (in points) are cut to two decimals."""
     picture = io.StringIO()
     figure.savefig(picture, format="svg")
     return re.sub(r'(?<= d=")[^"]+', lambda path: _DECIMALS.sub(r"\1", path[0]), picture.getvalue()).encode()
@@ -296,7 +296,7 @@ def _parameters(name: str, data: xr.Dataset) -> Table:
 def _rerun(url: str, held: Mapping[str, Any]) -> list[str]:
     """Return the commands that compute the study again."""
     model, version = str(held["model"]), held["model_version"]
-    own = f"# with version {version} of the model in the module {model.partition(':')[0]}, which is not packed"
+    own = f"# with version {version} of the model in the module {model.partition(':')[0]}, which is not included"
     return [
         f"# with mdr_dask {held['versions']['mdr_dask']}",
         *([own] if models.is_own(model) else []),
