@@ -20,7 +20,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True)
 class Statistic:
-    """One reduction over ``realisation``: a name, a meaning and a function that computes the reduction.
+    """A statistic over realisations: its name, its meaning and the function that computes it.
 
     The function takes an output and its companion, or None if the output has no companion. The function returns None
     if it needs a companion and there is none.

@@ -46,7 +46,7 @@ wear volume, worn volume, V, verschleißvolumen
 cycles, number of cycles, N, zyklen, zyklenzahl
 """.splitlines()
 )  # fmt: skip
-#: Words before or after the name of a quantity that do not change the meaning of the name.
+#: Words that may stand before or after the name of a quantity without changing its meaning.
 IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured", "linear"}
 #: Units that may be joined to a name, as in ``freq_hz``. The keys are in lower case.
 JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}

@@ -28,7 +28,7 @@ OPERATIONS = 1e9
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share a part of the computation are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
-#: Blocks with fewer operations than `MOST_SHARED` are halved only if the halving multiplies the total number of
+#: Such blocks with fewer operations than `MOST_SHARED` are halved only if the halving multiplies the total number of
 #: operations by less than this factor.
 REPEATED_WORK = 1.15
 #: The operations of at most this number of blocks of a series are counted, so that `check` is fast.
@@ -54,7 +54,7 @@ class Template:
     # Length of a block along each dimension.
     chunks: Mapping[str, int]
     outputs: tuple[Output, ...]
-    # Coordinates of the dimensions of outputs that are neither case dimensions nor ``realisation``.
+    # Coordinates of the dimensions that outputs have in addition to the case dimensions and ``realisation``.
     extra: Mapping[str, Coordinate]
 
     @property
@@ -78,7 +78,7 @@ class Template:
         return tuple(math.ceil(size / self.chunks[dim]) for dim, size in self.sizes.items())
 
     def extra_shape(self, output: Output) -> tuple[int, ...]:
-        """Return the lengths of the dimensions of an output that are neither case dimensions nor ``realisation``."""
+        """Return the lengths of the dimensions that an output has in addition to `dims`."""
         return tuple(self.extra[dim].values.size for dim in output.dims)
 
     @cached_property
@@ -167,7 +167,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block of the given lengths for estimates, at a `position` in the group from 0 (start) to 1 (end)."""
+        """Return a block of the lengths `chunks` for estimates, at a `position` from 0 (start of group) to 1 (end)."""
         starts = self._starts(chunks, position)
         return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
 
@@ -342,7 +342,7 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts if a dimension is cut into nearly equal parts of at most `most` values.
 
-    If rounds add realisations, the length along ``realisation`` divides the number of realisations in the first round.
+    With rounds, the length along ``realisation`` is a divisor of the number of realisations in the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication

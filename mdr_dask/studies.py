@@ -182,9 +182,9 @@ def aggregate(
     outputs : sequence of str
         Names of outputs; by default, all outputs with one number for each result.
     statistics : sequence of str
-        Some of `mdr_dask.aggregation.NAMES`.
+        Names of statistics, from `mdr_dask.aggregation.NAMES`.
     series, select, where, group_by, columns, units
-        As the options of the command (docs/questions.md).
+        The same as the options of the command (docs/questions.md).
 
     Returns
     -------
@@ -295,8 +295,8 @@ def plot(
     over : sequence of str, optional
         One axis for curves of an output, or two axes for a map. The default is the axis with the most values.
     select, where, by, panels, log, measured, units, size, title, style
-        As the options of the command. `measured` may also be a DataFrame, with units in brackets after the column
-        names.
+        The same as the options of the command. `measured` may also be a DataFrame, with units in brackets after the
+        column names.
 
     Returns
     -------
@@ -345,7 +345,7 @@ def master_curve(
     study : Dataset, DataTree, DataFrame, str or Path
         A study, a table of curves, or the path of a store or of a table.
     over, of, by, vertical, reference
-        As the options of the command.
+        The same as the options of the command.
 
     Returns
     -------
@@ -373,7 +373,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases. A number is left out if the study lacks a quantity in the formula."""
+        """The dimensionless numbers of the cases. A number is left out if the study lacks a quantity in its formula."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})

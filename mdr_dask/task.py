@@ -120,7 +120,7 @@ LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model for a block. If the call raises an exception, call the model for every single result.
+    """Call the model for a block. If the call raises an exception, call the model again for each result alone.
 
     If the user wrote the model (`is_own`), every exception counts as a failed case, and the results are checked.
     """

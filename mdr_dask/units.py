@@ -16,8 +16,8 @@ from mdr_dask.errors import similar
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: Units in the syntax of pint. Angles have a dimension. Pint's own list takes ten times as long to load. Units
-#: with one-letter names (``c``, ``e``, ``M``) in that list would mostly be mistakes in a campaign.
+#: Units in the syntax of pint. Angles have a dimension. Pint's own list takes ten times as long to load, and contains
+#: units with one-letter names (``c``, ``e``, ``M``), which would mostly be mistakes in a campaign.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-

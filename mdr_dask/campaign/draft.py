@@ -70,7 +70,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the dotted names of required parameters, and of those in the first alternative of each group."""
+    """Return the dotted names of required parameters, and of parameters in the first alternative of each group."""
     groups = getattr(parameters, "alternatives", ())
     return {*fields.required(parameters), *(name for group in groups for name in group[0])}
 
@@ -139,7 +139,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return 1, or another number within the bounds of a field if 1 is not within the bounds."""
+    """Return 1, or a number within the bounds of a field if 1 is not within these bounds."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

@@ -42,7 +42,7 @@ units_option = click.option(
     multiple=True,
     callback=_units,
     metavar="NAME=UNIT,...",
-    help="Units in which columns are given: velocity=km/h,temperature=degC; may be repeated.",
+    help="Units of columns or axes: velocity=km/h,temperature=degC; may be repeated.",
 )
 where_option = click.option(
     "--where",

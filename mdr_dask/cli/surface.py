@@ -1,4 +1,4 @@
-"""The command surface: height parameters, spectrum and figure of measured maps, scans and tables."""
+"""The command `surface`: height parameters, spectrum and figure of measured maps, scans and tables."""
 
 from __future__ import annotations
 

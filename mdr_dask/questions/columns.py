@@ -90,7 +90,7 @@ class Columns:
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit, or None if there is none. Outputs are averaged over the realisations."""
+        """Return a column with its unit, or None if it does not exist. Outputs are averaged over the realisations."""
         if name not in self._found:
             self._found[name] = None  # prevents an infinite recursion if a formula refers to itself
             self._found[name] = self._make(name)

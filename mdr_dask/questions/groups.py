@@ -30,7 +30,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     the standard error of the R results of a group are correct even if n_c is not the same for all cases.
 
     `by` contains names of axes, or of columns of a sampled study. If `kept` is given, only cases where `kept` is true
-    are included. The groups are along the dimension ``group``.
+    are included. The result has the dimension ``group`` instead of the axes.
     """
     import xarray as xr
 

@@ -94,7 +94,7 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Map each SI unit to its unit in the campaign file, unless there are several. K becomes degC by default."""
+    """Map SI units to units of the campaign file, except if several units replace one. K becomes degC by default."""
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():
