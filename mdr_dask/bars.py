@@ -1,4 +1,4 @@
-"""Show the progress of a run on stderr: a live line on a terminal, otherwise a line every few seconds."""
+"""Show the progress of a run: a bar in a notebook or on a terminal, otherwise a line on stderr every few seconds."""
 
 from __future__ import annotations
 

@@ -146,9 +146,9 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
     """Return the column that a name means, and its unit. The unit may be part of the name, such as mm/s in ``v_mm_s``.
 
     The column is None if the name means none of the `columns`. The name is compared with the names of `columns`, then
-    with their synonyms, and then with their `other_names`. Columns that the unit does not fit are considered last.
-    ValueError is raised if several columns fit equally well. If no column fits, the name may also be a synonym of an
-    entry of `other_names`.
+    with their synonyms, and then with their `other_names`. Columns that the unit does not fit are considered only if no
+    other column has the name. ValueError is raised if several columns fit equally well. If no column fits, the name may
+    also be a synonym of an entry of `other_names`.
     """
     exact = [column for column in columns if plain(name) == plain(column.name)]
     synonyms = [column for column in columns if is_called(name, column.name)]

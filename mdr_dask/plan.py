@@ -276,7 +276,7 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
         return []
     return [
         f"{template.campaign.source}: one case needs about {needed / 2**30:.4g} GiB of memory, "
-        f"expected at most the {limit / 2**30:.4g} GiB of this machine (fewer points, or less oversampling)"
+        f"expected at most the {limit / 2**30:.4g} GiB of this machine (use fewer points or less oversampling)"
     ]
 
 

@@ -49,12 +49,12 @@ _VARIATION = """\
 | written | means |
 |---|---|
 | `[1 N, 3 N, 10 N]` | these values, also for an entry of a structure such as `indenter` |
-| `[[1 ms], [1 ms, 1 s]]` | two values of a parameter that is itself a list; the store names them as they are written |
+| `[[1 ms], [1 ms, 1 s]]` | two values of a parameter that is itself a list; in the store, their names are these texts |
 | `{values: [...]}` | the same as a list |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
 | `{adaptive: [a, b], until: 1 %, at_most: 60}` | the study [chooses the values](adaptive.md) between `a` and `b` |
-| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | two structures; the store names them as they are written |
+| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | two structures; in the store, their names are these texts |
 | `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | an entry of `indenter`; its axis is called `indenter_angle` |
 
 The ends of a range are exact, the values between them are rounded to 14 digits. Values that agree to 12 digits count as
