@@ -90,7 +90,7 @@ def test_a_part_that_needs_results_of_missing_parts_ends_with_a_message(toy, url
     progress = run_part(adaptive(toy), url, 2, 3, tell=events.append)
     assert 0 < progress.done < 20
     assert events[-1].sentence == (
-        "the round of 5 realisations needs results of parts that are not at work: 1/3, 3/3; "
+        "the round of 5 realisations needs results of parts that are not running: 1/3, 3/3; "
         "start them, then this one again"
     )
 

@@ -31,7 +31,7 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
 #: Code that the server process runs.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
-#: Environment variables that limit libraries for linear algebra to one thread if they are set before the import.
+#: Environment variables that limit libraries for linear algebra to one thread when these libraries are imported.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 #: A child process is killed if a block takes this time in s longer than the sum of the time limits of its results. A
 #: case in plain Python normally raises TimeoutError earlier, at the time limit of the case.

@@ -46,7 +46,7 @@ class Progress:
     """The progress of a run. A result is one case in one realisation."""
 
     # Numbers of results: in all rounds that have begun (`total`), in the store before the run (`kept`), and written by
-    # this run (`done`, `failed` or not converged, and `not_needed`).
+    # this run (`done`, `failed` and `not_needed`). Results that are not converged count as failed.
     total: int = 0
     kept: int = 0
     done: int = 0
@@ -59,7 +59,7 @@ class Progress:
     # Number of blocks and number of solutions that this run has computed. Several results may share a solution.
     blocks: int = 0
     solves: int = 0
-    # Number of operations of all rounds that have begun, and of the finished blocks.
+    # Number of operations: of all rounds that have begun (`estimated`), and of the finished blocks (`finished`).
     estimated: float = 0.0
     finished: float = 0.0
     # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the

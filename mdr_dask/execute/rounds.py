@@ -28,7 +28,7 @@ from mdr_dask.replication import growth_needed, known_scatter, next_round
 from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
 
-#: Time in s between two checks (`LOOK`) and between two messages (`PAUSE`) of the progress of other parts.
+#: Time in s between two checks (`LOOK`) of the progress of other parts, and between two messages about it (`PAUSE`).
 LOOK, PAUSE = 1.0, 4.0
 
 
@@ -151,7 +151,7 @@ class _Run:
         return current.realisations[0]
 
     def plan_round(self, stage: Stage, last: _Round | None) -> _Round:
-        """Return the next round, and lay out the store for it if a case needs it; other parts wait meanwhile."""
+        """Return the next round. If any case needs this round, lay out the store for it. Other parts wait meanwhile."""
         replication = stage.campaign.replication
         with store.gate(self.url):
             layout, places = stored_layout(stage, self.url)
@@ -213,7 +213,7 @@ class _Run:
             if not late:
                 return True
             if late - here:
-                sentence = f"{what} that are not at work: {_named(late - here, part)}; start them, then this one again"
+                sentence = f"{what} that are not running: {_named(late - here, part)}; start them, then this one again"
                 self.tell(Event("round unfinished", {"parts": sorted(late - here)}, sentence))
                 return False
             if time.monotonic() - reported > PAUSE:
@@ -222,7 +222,7 @@ class _Run:
             time.sleep(LOOK)
 
     def mark_rest(self, stage: Stage, realisations: int) -> None:
-        """After the last stage, mark the results that no stage needed."""
+        """After the last stage, mark results that no stage needed as not needed."""
         layout, places = stored_layout(stage, self.url)
         asked = cases_of(stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in stage.meshes])
         rest = _Round(layout, asked, [np.zeros_like(mask) for mask in asked], (0, realisations))
@@ -231,7 +231,7 @@ class _Run:
 
 
 def _growth(url: str, template: Template, cases: BoolArray, count: int) -> FloatArray:
-    """Return the factor by which the realisations of each case must grow; at most 1 if the case has enough."""
+    """Return the factor by which the number of realisations of each case must grow; at most 1 if there are enough."""
     if not cases.any():
         return np.zeros(cases.shape)
     until, name = template.campaign.replication.until, template.series.name

@@ -99,7 +99,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert a text such as ``20 mm`` to SI units by the converter in the context. Keep names such as ``auto``."""
+        """Convert a text such as ``20 mm`` to SI units. Keep names such as ``auto``."""
         if isinstance(value, list | tuple):
             return tuple(to_si(item, info) for item in value)
         value = unquoted(value)
@@ -319,8 +319,8 @@ class Model(Generic[P]):
     * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
     * `compute`: a pure function. The outputs of a case depend on the parameters of the case, the seed and the
     realisation, but not on the other cases of the block. If a case fails, the function raises no exception.
-    * `operations`: approximate number of floating-point operations of a block. Block sizes are chosen by means of this
-    number. The function must be fast. If `operations` is None, a study with n results is divided into about sqrt(n)
+    * `operations`: a fast function that returns the approximate number of floating-point operations of a block. This
+    number determines the sizes of blocks. If `operations` is None, a study with n results is divided into about sqrt(n)
     blocks.
     * `whole`: parameters whose axes are not divided among blocks, because the cases along such an axis share work. If a
     block becomes too large, the axis of the last parameter in `whole` is divided first.
@@ -330,8 +330,8 @@ class Model(Generic[P]):
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
     campaign.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
-    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets of the study. One axis at
-    a time is varied to make these sets. A nested parameter set can have its own method `notes`.
+    * `notes`: notes for ``check`` about a study. The argument is a sequence with one parameter set for some of the
+    values of each axis. A nested parameter set can have its own method `notes`.
     """
 
     name: str

@@ -67,8 +67,8 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     """Return the units in which figures show the quantities of some series.
 
     If all campaign files use the same unit for a quantity, figures show this unit. Otherwise temperatures are in
-    degrees Celsius, and other quantities are in SI units, with a prefix that brings the largest value between 1 and
-    1000.
+    degrees Celsius, rotation speeds in rpm, angles in degrees, and other quantities in SI units, with a prefix that
+    brings the largest value between 1 and 1000.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}

@@ -37,10 +37,10 @@ class Page:
     """The requested appearance of a figure.
 
     `width` and `height` are in inches. Without a requested height, the height follows from the content. If `title` is
-    None, the title is a description of the figure, or empty if a width is requested. `style` is a style or style file
-    of matplotlib, and `cycle` holds the colours, lines and markers of this style. `units` maps names of quantities to
-    the requested units, and `symbols` maps names of coordinates to their labels. `used` collects the names of all
-    quantities that figures have shown.
+    None, the title is a description of the figure, or empty if a width is requested. `style` is the name of a style
+    of matplotlib or a style file, and `cycle` holds the colours, lines and markers of this style. `units` maps names
+    of quantities to the requested units, and `symbols` maps names of coordinates to their labels. `used` collects the
+    names of all quantities that figures have shown.
     """
 
     width: float | None = None

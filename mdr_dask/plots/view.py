@@ -277,8 +277,8 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 def _divided(found: Series, view: View, output: str) -> tuple[list[tuple[str, list[curves.Family]]], list[str]]:
     """Return the title and the curves of each panel, and texts about what is left out.
 
-    With `View.panels`, each value of this parameter has a panel. Otherwise there is one panel, or one panel for each
-    series if a common panel would have more curves than colours.
+    If `View.panels` names a parameter, each of its values has a panel. Otherwise there is one panel, or one panel for
+    each series if a common panel would have more curves than colours.
     """
     if view.panels:
         parts, left_out = _by_value(found, view)
@@ -309,7 +309,7 @@ def _together(series: Series, view: View, output: str) -> list[curves.Family]:
 
 
 def _fit(families: Sequence[curves.Family]) -> bool:
-    """Return whether the curves of several series can have different colours."""
+    """Return whether a panel can show the given curves. Curves of several series need different colours."""
     return len(families) == 1 or sum(len(one.curves) for one in families) <= colours.most()
 
 

@@ -43,7 +43,7 @@ class Place:
     index: BlockIndex
     # The part of the arrays that the block fills: one slice for each dimension, the last one for ``realisation``.
     region: tuple[slice, ...]
-    # The `layout_mark` that the driver found in the store. A worker that finds another mark writes nothing.
+    # The result of `layout_mark` in the main process of the run. A worker with another result writes nothing.
     layout: str
     lock: Lock
 

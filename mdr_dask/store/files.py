@@ -26,13 +26,13 @@ T = TypeVar("T")
 
 #: Name of the group at the root if the store also has series.
 ROOT = "-"
-#: Folder with claims: the files that replace locks on a server, and on a file system without locks.
+#: Folder with claims: lock files for servers and file systems that have no locks of their own.
 CLAIMS = ".claims/"
 #: Folder with the record of the layout (`mdr_dask.store.integrity`).
 RECORD_FOLDER = ".layout"
-#: Names of the files that a study may contain if the first run was stopped before the study was laid out.
+#: Files and folders that a store may contain if its first run was stopped before it created the arrays.
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
-#: Number of simultaneous requests to a server: enough to hide the time until the server answers.
+#: Number of simultaneous requests to a server. With fewer requests, a run would often wait for the answers.
 AT_ONCE = 64
 #: Time in s after which a request fails if the server has not answered.
 LONGEST_REQUEST = 120.0
@@ -297,7 +297,7 @@ def sweep(url: str) -> None:
     """Remove temporary files of killed processes. Call this only while no other run is active in the store."""
     path = local(url)
     if path is not None and path.is_dir():
-        with guarded(url, "removing what a killed run left"):
+        with guarded(url, "removing the temporary files of a killed run"):
             for folder, _, names in os.walk(path):
                 for name in names:
                     if name.endswith(".partial"):
@@ -316,7 +316,7 @@ def listed(url: str, prefix: str = "") -> list[str]:
     async def collect() -> list[str]:
         return sorted([name async for name in bytes_of(url).list_prefix(prefix)])
 
-    with guarded(url, f"listing {prefix or 'it'}"):
+    with guarded(url, f"listing {prefix or 'its files'}"):
         return sync(_answered(collect()))
 
 
@@ -331,13 +331,13 @@ def group_name(series: str, member: str = "") -> str:
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block in an array that has `further` more dimensions than the ledger."""
+    """Return the name of the chunk of a block. The array has `further` more dimensions than the ledger."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file."""
-    # no CRC: a chunk ends with the CRC of its earlier bytes, and the CRC of all such files is the same
+    # a CRC could not distinguish chunks: they end with the CRC of their other bytes, so all have the same CRC
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 

@@ -28,7 +28,7 @@ log = logging.getLogger("mdr_dask.store")
 
 @dataclass(frozen=True)
 class Stored:
-    """A campaign extended by the values of axes that a store already contains."""
+    """A campaign whose axes also have the values that a store already contains."""
 
     # The campaign to lay out. Each axis has first the stored values, then the new values.
     campaign: Campaign
@@ -182,7 +182,7 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of each entry of a dimension. An entry has one value of every axis along this dimension.
+    """Return the position of each entry along a dimension. An entry has one value of each axis of this dimension.
 
     The key of an entry is the text of these values, together with the number of equal entries before the entry.
     """

@@ -1,4 +1,4 @@
-"""The record of the layout, and the check of metadata. The record holds the digests of all metadata and coordinates."""
+"""The record of the layout, which holds the digests of all metadata and coordinates, and checks of metadata."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from mdr_dask.store.files import RECORD_FOLDER, parsed, read_bytes, with_digest
 
-#: File with the record of the layout. It describes an empty Zarr group, because Zarr warns about other files.
+#: File with the record of the layout. It has the form of an empty Zarr group, because Zarr warns about other files.
 RECORD = f"{RECORD_FOLDER}/zarr.json"
 #: Codecs of the arrays of a study. Other codecs might run code, and are refused.
 CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}
@@ -19,8 +19,8 @@ CODECS = {"bytes", "crc32c", "vlen-utf8", "zstd"}
 class LayoutRecord:
     """The record of the layout of a study."""
 
-    # For each file of the layout, the digests of all versions of the file, the newest version last. The file may have
-    # an older version, because a run may be killed between writing the record and writing the file.
+    # For each file of the layout, the digests of all versions of the file, the newest version last. The file in the
+    # store may be an older version, because a run may be killed after writing the record and before writing the file.
     files: Mapping[str, list[str]]
     # The content of the newest ``zarr.json``, for `mdr_dask.store.repair`.
     root: str

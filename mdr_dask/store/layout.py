@@ -162,7 +162,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment for a study that has series: how to open it. Opened as one dataset, such a study looks empty."""
+    """Return a comment that says how to open a study with series, which looks empty if it is opened as one dataset."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"

@@ -126,7 +126,7 @@ def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
         if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunk if all its values were NaN
             continue
         done = _has_done(ledger(url, name), blocks.lengths)
-        # list chunks after reading the ledger, which a run writes last
+        # first read the ledger, then list the chunks: a run writes the ledger of a block after all chunks of the block
         present = set(listed(url, group_name(name)))
         for array in list(blocks.further)[1:]:
             chunks = (blocks.chunk(array, tuple(block)) for block in np.argwhere(done).tolist())

@@ -46,11 +46,11 @@ except ImportError:  # runs then create claims instead of locks
     fcntl = None  # type: ignore[assignment]
 
 #: `BEAT`: time in s between two heartbeats of a run with a claim. `SILENCE`: time in s without a heartbeat after
-#: which the run counts as ended. The clocks of two machines may differ by some seconds.
+#: which the run counts as ended; much longer than `BEAT`, because the clocks of two machines may differ.
 BEAT = 10.0
 SILENCE = 60.0
-#: Time in s for which a process tries to acquire a lock. Another process may hold the lock for an instant, to check
-#: whether the lock is held.
+#: Time in s for which a process tries to acquire a lock. A process that only checks whether the lock is held also
+#: holds the lock for an instant.
 GLANCE = 0.5
 #: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
 #: message is logged.
@@ -75,8 +75,8 @@ class Lock:
     owner: str
     # Number of the claim. None for a lock of the operating system.
     claim: int | None = None
-    # Whether an earlier run crashed or was killed while holding this lock. The exclusive lock also includes runs that
-    # held the lock of a part.
+    # Whether an earlier run crashed or was killed while holding this lock. For the exclusive
+    # lock, also whether a run crashed or was killed while holding the lock of a part.
     after_crash: bool = False
 
 
@@ -101,7 +101,7 @@ class Part:
         """Return the part that a block belongs to, from the position of the block among all blocks.
 
         With 3 parts, the blocks belong in turn to the parts 1, 2, 3, then 2, 3, 1, then 3, 1, 2, and so on. With the
-        order 1, 2, 3, 1, 2, 3, one part would get all blocks at one position on an axis of 3 blocks.
+        order 1, 2, 3, 1, 2, 3, each part would get only one third of an axis that is divided into 3 blocks.
         """
         return cls((position + position // count) % count + 1, count)
 
@@ -216,7 +216,7 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
     """Raise StoreBusyError if a run no longer holds the given lock, and StoreError if the store can only be read.
 
-    No other run can take over a lock of the operating system until this context ends. A claim is checked only once.
+    No other run can acquire a lock of the operating system until this context ends. A claim is checked only once.
     """
     if not lock.owner:
         raise StoreError(f"{url}: the study is not finished, and nothing can be written here (permission denied)")
@@ -240,7 +240,7 @@ def while_locked(url: str, lock: Lock) -> Iterator[None]:
 
 
 def _lock_file(url: str, name: str = "") -> Path:
-    """Return the path of a lock file. The file lies next to a store on this machine."""
+    """Return the path of a lock file. The file is in the folder that contains the store, not in the store."""
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
@@ -345,7 +345,7 @@ def _runners(url: str, name: str) -> list[Path]:
 
 @contextmanager
 def _registered(url: str, name: str) -> Iterator[Lock]:
-    """Write the runner file of a lock, and remove older runner files of the lock. A runner file names the holder.
+    """Write the runner file of a lock, and remove older runner files of the lock. A runner file names the process.
 
     A task that writes holds a shared lock on the runner file (`while_locked`).
     """
@@ -360,7 +360,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Wait until no task that needs the runner files of a lock is writing, and remove these files."""
+    """Remove the runner files of a lock. Before this, wait until tasks that have locked these files finish writing."""
     give_up = time.monotonic() + SILENCE
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
@@ -418,7 +418,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
     number = max(standing, default=0) + 1
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
-        # this run has made the claim if only the reply of the server was lost
+        # if only the reply of the server was lost, the claim exists and this run is its owner
         if _read_claim(url, _claim(name, number)).get("owner") != owner:
             raise _busy(url, _holder(url, name))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):

@@ -20,7 +20,7 @@ LARGEST_RATIO, SMALL = 100, 2**20
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and the content of every file of a study, except the files that a publication adds."""
+    """Yield the name and the content of every file of a study, without files of active runs and of the publication."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content
@@ -67,9 +67,9 @@ def _compare(folder: str, expected: Mapping[str, str]) -> Iterator[Finding]:
     """Yield a finding for each foreign, missing or damaged file in the folder of an unpacked study."""
     there = {name: hashlib.sha256(content or b"").hexdigest() for name, content in read_many(folder, listed(folder))}
     for name in sorted(there.keys() - expected.keys() - {CHECKSUMS}):
-        yield Finding("foreign", name, "it has no checksum")
+        yield Finding("foreign", name, "not in the list of checksums")
     for name, checksum in expected.items():
         if name not in there:
-            yield Finding("missing", name, "it has a checksum")
+            yield Finding("missing", name, "in the list of checksums, but not in the zip")
         elif there[name] != checksum:
             yield Finding("damaged", name, "not what was packed")

@@ -47,8 +47,8 @@ def is_damage(error: Exception) -> bool:
 def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
-    The values of numeric axes are in ascending order. The group of a study without series has the name ``""``. If an
-    earlier version has added series, its name is ``"-"``. Groups larger than `LAZY_BYTES` contain Dask arrays.
+    The values of numeric axes are in ascending order. The group of a study without series has the name ``""``, or
+    ``"-"`` if an earlier version of mdr_dask has added series. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
     with readable(url):
         names = series_names(url)
@@ -65,7 +65,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
-    # every step of a reduction would read a lazy coordinate again
+    # load the coordinates: otherwise every step of a reduction would read them again
     dataset = dataset.assign_coords({name: each.copy(data=each.to_numpy()) for name, each in dataset.coords.items()})
     for dim in dataset.dims:
         if (
@@ -74,7 +74,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             and not dataset.indexes[dim].is_monotonic_increasing
         ):
             dataset = dataset.sortby(dim)
-    # remove coordinates of parameters inside the values of an axis: they belong only to the first value of the axis
+    # if the values of an axis are parameter sets, remove the coordinates of single parameters of these sets
     inner = {"_".join(path) for axis in dataset.attrs["axes"] for path in entries_of(axis)}
     order = [*dataset.attrs["outputs"], "status"]
     return dataset[order].drop_vars(inner & dataset.coords.keys())

@@ -85,7 +85,7 @@ def attempts(url: str, series: str) -> dict[BlockIndex, int]:
 
 
 def merge_records(url: str, series: str) -> None:
-    """Merge record files of single blocks into files with many records, if the blocks are in the ledger.
+    """Merge record files of blocks whose ledger has been written. Each new file holds many records.
 
     A record can be in two files if a process is killed while merging, or if two processes merge the same files.
     """

@@ -159,9 +159,9 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
         if record is None:
             finding = Finding("damaged", name, "a record is not what was written")
         elif not is_merged and name != name_of(series, tuple(record["block"]), record["attempt"]):
-            finding = Finding("damaged", name, f"the record of block {record['block']}")
+            finding = Finding("damaged", name, f"contains the record of block {record['block']}")
         elif not group.blocks.has(tuple(record["block"])):
-            finding = Finding("foreign", name, f"the record of block {record['block']}, which does not exist")
+            finding = Finding("foreign", name, f"contains the record of block {record['block']}, which does not exist")
         else:
             block = tuple(record["block"])
             group.attempts.setdefault(block, {})[record["attempt"]] = record.get("chunks", {})
