@@ -22,8 +22,8 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 class Statistic:
     """A statistic over realisations: its name, its meaning and the function that computes it.
 
-    The function takes an output and its companion, or None if the output has no companion. The function returns None
-    if it needs a companion and there is none.
+    The arguments of the function are an output, and its companion or None. The function returns None if it needs a
+    companion and there is none.
     """
 
     name: str

@@ -121,7 +121,7 @@ def _write(line: str) -> None:
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
 
-    Between the ends of two blocks, the remaining time counts down. A remaining time of zero is not shown.
+    The remaining time counts down until another block ends. A remaining time of zero is not shown.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

@@ -58,7 +58,7 @@ def complete(values: FloatArray) -> FloatArray:
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return two copies of all values for each group of neighbours, with this group shifted up or shifted down.
+    """For each group of neighbouring values, return all values twice: with this group shifted up, and shifted down.
 
     A value is shifted by the error of this value. If the error is infinite, the value is shifted by its absolute value.
     """

@@ -173,7 +173,7 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             for column in columns:
                 if column.holds(" ".join(words[:count])) and fits(joined, column):
                     return column, joined
-    written = _BRACKETED.fullmatch(name)  # a text in brackets that is no known unit is still part of the name
+    written = _BRACKETED.fullmatch(name)  # an unknown unit in brackets is still part of the name
     return match(written[1], written[3], columns) if written and not unit else (None, unit)
 
 

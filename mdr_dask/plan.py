@@ -28,8 +28,8 @@ OPERATIONS = 1e9
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share a part of the computation are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
-#: Such blocks with fewer operations than `MOST_SHARED` are halved only if the halving multiplies the total number of
-#: operations by less than this factor.
+#: Blocks whose cases share work and that have fewer operations than `MOST_SHARED` are halved only if this multiplies
+#: the total number of operations by less than this factor.
 REPEATED_WORK = 1.15
 #: The operations of at most this number of blocks of a series are counted, so that `check` is fast.
 SAMPLED = 1000
@@ -342,7 +342,7 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts if a dimension is cut into nearly equal parts of at most `most` values.
 
-    With rounds, the length along ``realisation`` is a divisor of the number of realisations in the first round.
+    If later rounds may follow, the length along ``realisation`` divides the number of realisations in the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication

@@ -30,7 +30,7 @@ BLANKS = r"\s+"
 SEPARATORS = ("\t", ";", "|", ",", BLANKS)
 #: In the text of a workbook, each sheet begins with a line of this text and the name of the sheet.
 SHEET = "# sheet of a workbook: "
-#: Measured values count as equal up to this relative difference. Instruments print three digits.
+#: Measured values count as equal up to this relative difference, because instruments print only three digits.
 AGREE = 0.01
 #: A table without names and with more columns than this is described as a map.
 MOST_COLUMNS = 6

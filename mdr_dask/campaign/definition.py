@@ -110,7 +110,7 @@ class Tolerance:
 class Refinement:
     """The rule by which a study chooses the values of an adaptive axis."""
 
-    # The interval of the axis. The scale of the interval is also used to interpolate the outputs.
+    # The interval of the axis. Outputs are interpolated on the same scale (linear or logarithmic).
     spread: Spread
     # Largest accepted interpolation error of each output. A relative error refers to the largest value along the axis.
     until: Mapping[str, Tolerance]
@@ -119,7 +119,7 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case, and the tolerances that end the rounds."""
+    """The least and the largest number of realisations of a case, and the tolerances that decide between them."""
 
     # Number of realisations in the first round, and largest number of realisations in all rounds together.
     at_least: int

@@ -134,7 +134,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """The signal to stop reading a document, after a problem of its size or nesting was reported."""
+    """The signal to stop reading a document that is too large or too deeply nested. The problem is already reported."""
 
 
 class _Reader:

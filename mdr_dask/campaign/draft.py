@@ -35,7 +35,7 @@ realisations: 1                     # samples of each case, with different rando
 
 parameters:
 """
-#: `_COMMENTS`: column in which comments begin. `_LONGEST`: longer defaults are written as ``[...]``.
+#: `_COMMENTS`: column in which comments begin. `_LONGEST`: a default with more characters becomes ``[...]``.
 _COMMENTS, _LONGEST = 36, 60
 _EXAMPLE_FILE = "table.csv"
 _BOUNDS = ("gt", "ge", "lt", "le")

@@ -33,7 +33,7 @@ def expand(
     directory: str,
     outputs: Sequence[str],
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series without problems, and remarks for the user. Add the problems of other series to `document`.
+    """Return all series that have no problem, and remarks for the user. Add the problems of the others to `document`.
 
     Names of files are relative to `directory`.
     """
@@ -149,7 +149,7 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the values of one axis, checked with the first values of other axes, or None if a value is wrong."""
+        """Return the values of one axis, each checked with the first values of the other axes; None if one is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         # the problems of another axis are reported when the values of that axis are checked

@@ -61,7 +61,7 @@ def listed(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
-    """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``."""
+    """Return the parameter set that a mapping describes. Keys such as ``shape: cone`` identify the parameter set."""
     if not isinstance(value, dict):
         return None
     for kind in structures(info):

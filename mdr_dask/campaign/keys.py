@@ -52,7 +52,7 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return _quantity(_plain(value.magnitude), f"{value.units:~}")
     if isinstance(value, np.floating):
-        # the text of a float32 is 0.1, while float() would give 0.10000000149
+        # str(np.float32(0.1)) is 0.1, while float(np.float32(0.1)) would be 0.10000000149
         return tidy(float(str(value)), whole=False)
     if isinstance(value, np.generic):
         return value.item()

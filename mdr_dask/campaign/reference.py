@@ -48,14 +48,14 @@ _VARIATION = """\
 
 | written | means |
 |---|---|
-| `[1 N, 3 N, 10 N]` | these values, also for an entry of a structure such as `indenter` |
+| `[1 N, 3 N, 10 N]` | these values; also possible for a nested parameter, such as `angle` of `indenter` |
 | `[[1 ms], [1 ms, 1 s]]` | two values of a parameter that is itself a list; in the store, their names are these texts |
 | `{values: [...]}` | the same as a list |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
 | `{adaptive: [a, b], until: 1 %, at_most: 60}` | the study [chooses the values](adaptive.md) between `a` and `b` |
-| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | two structures; in the store, their names are these texts |
-| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | an entry of `indenter`; its axis is called `indenter_angle` |
+| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | two values of `indenter`, named by these texts in the store |
+| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | 20 angles of a cone; the axis is called `indenter_angle` |
 
 The ends of a range are exact, the values between them are rounded to 14 digits. Values that agree to 12 digits count as
 the same value. In a range of whole numbers, values are rounded, and each value appears once.
@@ -71,9 +71,9 @@ Each of the `series` replaces some of the `parameters`. A campaign without `seri
 | `{saltelli: n}` | `n` (d + 2) points for [Sobol indices](sensitivity.md) of `d` varied parameters |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
-All except `grid` have the single dimension `case`. Ranges to draw from have no number of values: `{linear: [a, b]}` is
-uniform, `{geometric: [a, b]}` is uniform in the logarithm. Drawn points depend only on `seed`; a larger `sobol` keeps
-the points of a smaller one. The headings of a table are names of parameters, with units if needed:
+All except `grid` have the single dimension `case`. A range from which points are drawn states no number of values:
+`{linear: [a, b]}` is uniform, `{geometric: [a, b]}` is uniform in the logarithm. Drawn points depend only on `seed`; a
+larger `sobol` keeps the points of a smaller one. The headings of a table are names of parameters, with units if needed:
 `velocity [mm/s],indenter.angle [deg]`.
 """
 
@@ -166,7 +166,7 @@ def _rows(parameters: type[BaseModel], first: str) -> Iterator[dict[str, str]]:
     for path, kind, info in fields.walk(parameters):
         name = path.rpartition(".")[2]
         condition = ", ".join(f"{key}: {value}" for key, value in fields.fixed(kind).items())
-        allowed = _allowed(_properties(kind)[name]).removesuffix(": ")  # the entries of a list may be parameter sets
+        allowed = _allowed(_properties(kind)[name]).removesuffix(": ")  # drops the colon of ``list, each: ``
         nested, entries = (
             [fields.written(each, dict.fromkeys(each.model_fields, "...")).replace(": ...", "") for each in kinds]
             for kinds in (fields.structures(info), fields.listed(info))

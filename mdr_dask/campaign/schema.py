@@ -88,7 +88,7 @@ def _ranges() -> Schema:
         found[kind] = _alone(kind, ends_and_count, f"{kind} range [first, last, count]")
     found["adaptive"] = _readable(RefinedSpec.model_json_schema(ref_template="#/$defs/{model}"))
     found["adaptive"].pop("$defs")
-    found["values"] = _alone("values", {"type": "array", "minItems": 1}, "the values one after the other")
+    found["values"] = _alone("values", {"type": "array", "minItems": 1}, "list of the values")
     return found
 
 

@@ -28,7 +28,7 @@ FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
 class ToleranceSpec(Parameters):
     """The largest accepted relative and absolute error of an output."""
 
-    relative: float = quantity("1", "largest error relative to the mean, such as 1 %", default=0.0, ge=0)
+    relative: float = quantity("1", "largest relative error, such as 1 %", default=0.0, ge=0)
     absolute: float | str = Field(0.0, description="largest error in the unit of the output, such as 2 um")
 
 
@@ -48,8 +48,8 @@ class RefinedSpec(Parameters):
 
     adaptive: list[Any] = Field(description="first and last value of the axis")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(
-        description="largest interpolation error: 1 % of the largest value of the first output, or for each "
-        "named output: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
+        description="largest accepted interpolation error: 1 % allows 1 % of the largest value of the first output; "
+        "{friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}} sets the error of each named output"
     )
     at_most: Whole = Field(
         60,

@@ -148,5 +148,5 @@ def _discard_output() -> None:
 
 
 def _interrupt(*_: object) -> None:
-    """Raise KeyboardInterrupt on SIGTERM, which batch systems send at the wall time."""
+    """Raise KeyboardInterrupt on SIGTERM, which batch systems send when the time of a job is over."""
     raise KeyboardInterrupt

@@ -73,8 +73,8 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print the factors, their errors and fitted laws.
 
-    SOURCE is a store or a table: a CSV file with a row of names and, if wanted, a row of units; - means standard input.
-    The storage and loss modulus of a test are shifted together, unless --of names only one modulus.
+    SOURCE is a store, a table, or - for a table from standard input. A table has a row of names, and may have a row of
+    units. The storage and loss modulus of a test are shifted together, unless --of names only one modulus.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png

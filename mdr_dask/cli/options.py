@@ -61,7 +61,7 @@ limit_option = click.option(
 )
 _LOOK = (
     click.option("--size", metavar="WIDTH[xHEIGHT]", help="Size of a figure on paper: 85mm, 85x60mm."),
-    click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description, or none with --size]"),
+    click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description; no title with --size]"),
     click.option("--style", metavar="FILE", help="Style file of matplotlib, or the name of one of its styles."),
 )
 

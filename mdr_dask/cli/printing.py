@@ -52,7 +52,7 @@ def _filled(line: str) -> str:
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
-    """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units."""
+    """Print rows, all with the same keys: as an aligned ``table``, as ``csv``, or as a ``json`` document with units."""
     if form == "json":
         print_json({"units": units, "rows": [{key: finite(value) for key, value in row.items()} for row in rows]})
         return

@@ -155,9 +155,9 @@ def _write(read: Surface, path: Path) -> None:
 
 def _method(read: Surface) -> str:
     if read.map is not None:
-        window = "Hann's window of the distance from the middle" if read.map.window == "hann" else "no window"
-        return f"{read.map.detrend} subtracted, {window}, C2D in rings of the wave vector"
+        window = "Hann's window of the distance from the centre" if read.map.window == "hann" else "no window"
+        return f"{read.map.detrend} subtracted, {window}, C2D averaged over rings of constant wavenumber"
     if read.scan is not None:
         window = "Hann's window" if read.scan.window == "hann" else "no window"
-        return f"{read.scan.detrend} subtracted, {window}, C2D from the cut by the inverse of Abel's transform"
+        return f"{read.scan.detrend} subtracted, {window}, C2D from the scan by the inverse Abel transform"
     return "C2D of the table"

@@ -20,7 +20,7 @@ from mdr_dask.questions.expression import ALTERNATIVES, Find, Value, evaluate, p
 
 #: Names of two columns: the state of a row, and the number of results in this row that are done.
 STATUS, REALISATIONS = "status", "realisations"
-#: Name of the variable with the number of results in each state. Stores lack it; averages over cases have it.
+#: Name of the variable with the number of results in each state, in datasets made by `groups.averaged`.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)

@@ -27,7 +27,7 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Numbers in conditions and selections count as equal up to this relative difference. Tables show six digits.
+#: Numbers in conditions and selections count as equal up to this relative difference, because tables show six digits.
 SAME = 1e-5
 #: Dimension of a column with several words in each row. A comparison is true if it is true for any word of the row.
 ALTERNATIVES = "alternatives"
@@ -105,7 +105,7 @@ def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> V
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Replace numbers with units by names, because Python cannot parse units. Also return the values of the names."""
+    """Replace each number that has a unit by a name that Python can parse. Also return the values of the names."""
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):

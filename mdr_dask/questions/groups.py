@@ -110,7 +110,7 @@ def _common(values: FloatArray, members: _Members) -> FloatArray:
 
 
 def _errors(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the mean grid error of every group. All realisations of a group have the same error."""
+    """Return the mean grid error of every group, with the same value in all realisations of the group."""
     each = _common(np.abs(values), members)
     there = np.isfinite(each)
     with np.errstate(invalid="ignore"):

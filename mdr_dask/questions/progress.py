@@ -94,7 +94,7 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Map SI units to units of the campaign file, except if several units replace one. K becomes degC by default."""
+    """Map each SI unit to the unit used instead in the campaign file, if there is only one; by default K to degC."""
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():

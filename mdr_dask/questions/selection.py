@@ -146,7 +146,7 @@ def _chosen(axis: xr.DataArray, name: str, wanted: str, own: str, tell: Tell) ->
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
-    given = ~np.isnan(values)  # NaN: a structure on the axis, such as an indenter, lacks the parameter
+    given = ~np.isnan(values)  # NaN: a value of the axis, such as an indenter, lacks the parameter
     unit = str(axis.attrs.get("units", "1"))
     text = partial(shown, unit=unit, digits=6, written=own)
     chosen, values = np.zeros(values.shape, dtype=bool), values[given]
@@ -176,7 +176,7 @@ def _chosen_words(labels: list[str], name: str, wanted: str) -> NDArray[np.bool_
 
 
 def _words(text: str) -> list[str]:
-    """Split words at commas, except inside lists and structures."""
+    """Split a text at commas, except inside ``[...]`` and ``{...}``."""
     words, depth = [""], 0
     for mark in text:
         depth += (mark in "[{") - (mark in "]}")

@@ -187,7 +187,7 @@ class _Maker:
             yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
-        """For each box, yield the rows that meet the condition: their positions among all rows, and their data."""
+        """Yield the rows of each box that meet the condition: their positions among all rows, and their data."""
         if whole and data.nbytes <= WHOLE:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()

@@ -106,6 +106,6 @@ def _named_files(url: str) -> list[dict[str, str]]:
 def _environment() -> str:
     """Return the installed packages as a requirements file for pip, with Python and platform in comments."""
     lines = [f"# Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} processors"]
-    lines.append(f"# {datetime.now(UTC).isoformat(timespec='seconds')}; versions of each block: status/records")
+    lines.append(f"# {datetime.now(UTC).isoformat(timespec='seconds')}; versions of each block are in status/records")
     found = {str(one.metadata["Name"]): str(one.version) for one in distributions() if one.metadata["Name"]}
     return "\n".join([*lines, *(f"{name}=={version}" for name, version in sorted(found.items())), ""])
