@@ -18,7 +18,7 @@ CONFIDENCE = 0.95
 #: Number of resamples. With 400 resamples, the ends of an interval are accurate to about 5 % of the width of the
 #: interval.
 RESAMPLES = 400
-#: Largest number of groups of values. The values of one group are shifted, or left out, together.
+#: Largest number of groups of values. All values of a group are shifted by their errors, or left out, at the same time.
 GROUPS = 32
 #: Cumulative probabilities at the lower and the upper end of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
@@ -104,7 +104,7 @@ def _reach(shifts: FloatArray) -> FloatArray:
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack in which each shifted row shifts a group of neighbouring cases instead of a single case."""
+    """Return a stack in which errors shift groups of neighbouring cases instead of single cases."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)

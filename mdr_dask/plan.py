@@ -122,7 +122,7 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the approximate number of operations of a block, counted for its cases and the first realisations."""
+        """Return the approximate number of operations of a block, counted for the first realisations of its cases."""
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
         first, known = (*cases, 0), self._known

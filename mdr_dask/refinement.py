@@ -158,7 +158,7 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
     `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, how many
-    combinations of values of the other axes miss the tolerance although none of their intervals may be halved again.
+    combinations of non-adaptive values miss the tolerance although none of their intervals may be halved again.
     """
     found, short = mesh, {}
     for number in mesh.shares:
@@ -227,9 +227,9 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return, for each interval, the largest ratio of interpolation error to tolerance over all lines.
+    """Return, for each interval, the largest ratio of interpolation error to tolerance over all rows of `lines`.
 
-    If every line has a failed case at one or both ends of the interval, the result is minus infinity.
+    If every row has a failed case at one or both ends of the interval, the result is minus infinity.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])

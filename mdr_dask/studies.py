@@ -409,7 +409,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign. A temporary store is named by a digest of campaign and model."""
+    """Return the path of a campaign's store. The name of a temporary store contains a digest of campaign and model."""
     if not is_temporary:
         return found.store
     made_by = f"{models.load(found.model).version} {models.source_digest(found.model)}"

@@ -117,7 +117,7 @@ _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
 #: A factor before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``, or a factor without a unit, as in
-#: ``10^3`` or ``x 1000``. The number in ``mu (10)`` is not a factor, because this number may be a condition.
+#: ``10^3`` or ``x 1000``. The number in ``mu (10)`` is not a factor, but perhaps the condition of a test.
 _POWER = r"10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?e[+-]?\d+"
 _FACTOR = re.compile(
     rf"([x×*]\s*\d+|{_POWER})\Z|[x×*]?\s*({_POWER}|\d+(?:\.\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE

@@ -112,7 +112,7 @@ class Refinement:
 
     # The interval of the axis. Outputs are interpolated on the same scale (linear or logarithmic).
     spread: Spread
-    # Largest accepted interpolation error of each output. A relative error refers to the largest value along the axis.
+    # Largest accepted interpolation error of each output. Relative errors refer to the largest absolute value.
     until: Mapping[str, Tolerance]
     at_most: int
 
@@ -142,7 +142,7 @@ class Campaign:
     seed: int
     replication: Replication
     series: tuple[Series, ...]
-    # The arrays to compute and store, in the order of the model.
+    # The outputs to compute and store, in the order in which the model declares them.
     outputs: tuple[str, ...]
     # Relative error allowed for the outputs.
     accuracy: float | None

@@ -1,4 +1,4 @@
-"""Write a first campaign of a model: every parameter with a usual value, its unit and its meaning."""
+"""Write a first campaign file for a model: every parameter with a usual value, its unit and its meaning."""
 
 from __future__ import annotations
 

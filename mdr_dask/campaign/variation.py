@@ -89,7 +89,7 @@ def find(
 
 
 class _MalformedError(Exception):
-    """The signal to stop reading a range, after a problem of the range was reported."""
+    """The signal to stop reading a list or a range that is wrong. The problem is already reported."""
 
 
 @dataclass(frozen=True)

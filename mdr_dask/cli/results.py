@@ -25,7 +25,7 @@ from mdr_dask.cli.writing import require_suffix, writing
 
 
 class Reading(click.Command):
-    """A command whose first argument is a store."""
+    """A command whose first argument is a store, or a table instead of a store."""
 
     def invoke(self, context: click.Context) -> Any:
         """Run the command. If a chunk of the store cannot be read, raise an error of one sentence."""

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 @click.argument("campaign", type=CAMPAIGN)
 @click.option("--store", "url", help="Path or URL of the store, instead of the one that the file names.")
 @click.option("--dry-run", is_flag=True, help="Print what would be computed, and compute nothing.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one per core).")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes of this machine, instead of threads.")
+@click.option("--threads", type=click.IntRange(min=1), help="Number of threads (default: one per core).")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes on this machine, instead of threads.")
 @click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
 @click.option("--cluster", type=CAMPAIGN, help="YAML file with class, arguments and scale of any Dask cluster.")
 @click.option(

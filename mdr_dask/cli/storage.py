@@ -71,7 +71,7 @@ def _document(found: Inspection) -> dict[str, object]:
 @click.command()
 @click.argument("stores", nargs=-1, required=True, metavar="STORE...")
 @click.option(
-    "--output", "-o", default="report.html", show_default=True, type=click.Path(path_type=Path), help="The file."
+    "--output", "-o", default="report.html", show_default=True, type=click.Path(path_type=Path), help="File to write."
 )
 def report(stores: tuple[str, ...], output: Path) -> None:
     """Write a page about studies: one HTML file that any browser opens, without a network.
@@ -96,7 +96,7 @@ def report(stores: tuple[str, ...], output: Path) -> None:
 @click.command()
 @click.argument("store")
 @click.option(
-    "--output", "-o", default="study.zip", show_default=True, type=click.Path(path_type=Path), help="The file."
+    "--output", "-o", default="study.zip", show_default=True, type=click.Path(path_type=Path), help="File to write."
 )
 def publish(store: str, output: Path) -> None:
     """Pack a study for publication: store, campaign, data files, page, environment and checksums.

@@ -30,7 +30,7 @@ KINDS = ("map", "scan", "spectrum")
 @click.option(
     "--window",
     type=click.Choice(("hann", "none")),
-    help="Window of the heights; none only for a periodic surface.  [hann]",
+    help="Window function of the heights; use none only for a periodic surface.  [hann]",
 )
 @click.option(
     "--outliers", type=click.Choice(("keep", "fill")), help="Keep or replace points far from their neighbours.  [keep]"

@@ -45,7 +45,7 @@ def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def inner(dataset: xr.Dataset, name: str) -> xr.DataArray | None:
-    """Return a parameter inside the values of an axis, such as ``indenter_radius`` along an axis of indenters.
+    """Return a parameter nested in the values of an axis, such as ``indenter_radius`` along an axis of indenters.
 
     Return NaN, or ``-`` for words, where a value of the axis lacks the parameter. Return None if every axis lacks it.
     """
@@ -119,7 +119,7 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for use in a condition; ``status == failed`` is true for rows with any failed result."""
+        """Return a column for use in a condition; ``status == failed`` is true for rows with a failed result."""
         found = self.find(name)
         if name != STATUS or found is None:
             return found

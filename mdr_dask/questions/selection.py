@@ -190,7 +190,7 @@ def _words(text: str) -> list[str]:
 def _nearest(
     values: NDArray[Any], wanted: float, name: str, text: Callable[[float], str], tell: Tell
 ) -> NDArray[np.bool_]:
-    """Return a mask of the value nearest to a number. For a number outside the axis, no value is selected."""
+    """Return a mask of the value nearest to a number. For a number outside the range of the axis, select none."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
