@@ -134,7 +134,7 @@ def serve(model: str, numbers: list[int]) -> None:
     """Import the modules that blocks need, and run one child for each pipe until the driver closes the pipe."""
     # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(Exception):  # the first block raises the error again
+    with suppress(Exception):  # the error is reported when the first block raises it again
         models.load(model)
     pipes = [Connection(number) for number in numbers]
     served = {_fork(pipe, pipes): pipe for pipe in pipes}

@@ -206,7 +206,7 @@ class Output:
 class Number:
     """A dimensionless number that is computed for each case.
 
-    Users can write the name of the number in tables and conditions. The module `mdr_dask.questions.expression`
+    Users can use its name for a column of a table and in conditions. The module `mdr_dask.questions.expression`
     evaluates `formula`. The formula may contain outputs, other numbers and parameters. In a formula, the nested
     parameter ``indenter.angle`` is called ``indenter_angle``.
     """
@@ -313,8 +313,8 @@ class Result:
 class Model(Generic[P]):
     """A computation that a campaign can name.
 
-    * `version`: a number that is raised when a change of the code changes results. A store can be extended only by the
-    model version that created the store.
+    * `version`: a number that is increased whenever a change of the code changes results. A store can be extended only
+    by the model version that created the store.
     * `summary`: one line for ``mdr-dask models``.
     * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
     * `compute`: a pure function. The outputs of a case depend on the parameters of the case, the seed and the
@@ -330,8 +330,8 @@ class Model(Generic[P]):
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
     campaign.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
-    * `notes`: notes for ``check`` about a study. The argument is a sequence with one parameter set for some of the
-    values of each axis. A nested parameter set can have its own method `notes`.
+    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets: one set for each of
+    some values of every axis. A nested parameter set can have its own method `notes`.
     """
 
     name: str

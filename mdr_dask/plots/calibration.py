@@ -18,7 +18,7 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF, conditions
 
-#: Number of samples of the posterior for the band of predictions.
+#: Number of samples of the posterior distribution from which the band of predictions is computed.
 SAMPLES = 400
 Points = NDArray[np.intp]
 

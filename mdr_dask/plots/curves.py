@@ -82,7 +82,7 @@ def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
 
 
 def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
-    """Return the parameters that change along a dimension. In a sampled design, several parameters change."""
+    """Return the parameters that change along a dimension. In a sampled design, several parameters change together."""
     names = [str(name) for name, values in data.coords.items() if values.dims == (dim,)]
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     return sorted(names or [dim], key=lambda name: axes.index(name) if name in axes else -1)

@@ -22,7 +22,7 @@ Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values with the lower and upper limits of intervals. The limits are NaN if the error is unknown."""
+    """Values with the lower and upper limits of their intervals. The limits are NaN if the error is unknown."""
 
     value: Any
     low: Any

@@ -26,7 +26,7 @@ MANY_POINTS = 60
 
 
 class Drawn(MplFigure):
-    """A matplotlib figure with the description of the figure. A notebook shows the figure as a picture."""
+    """A matplotlib figure that also holds its description as data. A notebook shows the figure as a picture."""
 
     def __init__(self, description: Figure, **options: Any) -> None:
         super().__init__(**options)

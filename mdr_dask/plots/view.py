@@ -227,7 +227,7 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
 
 
 def _height(view: View, output: str, array: xr.DataArray, values: Any) -> Axis:
-    """Return the vertical axis of an output with the given values in the shown unit."""
+    """Return the vertical axis of an output. `values` are the drawn values in the shown unit."""
     is_linear = view.log is None and array.attrs.get("units", "1") == "1"
     log = not is_linear and view.is_log("y", values, labels.quantity(output, array))
     return Axis(labels.label(output, array), log, quantity=output)

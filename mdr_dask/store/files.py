@@ -216,7 +216,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and the missing parents of the folder. Return the folders to flush."""
+    """Make a folder and the missing parents of the folder. Return the folders that have a new entry."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]

@@ -209,7 +209,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return a value of an axis from the stored form of the value. Lists and mappings are validated."""
+    """Convert the stored form of a value of an axis back to the value. Lists and mappings are validated."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

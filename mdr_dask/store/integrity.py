@@ -1,4 +1,4 @@
-"""The record of the layout, which holds the digests of all metadata and coordinates, and checks of metadata."""
+"""Check metadata, and read the record of the layout, which holds the digests of all metadata and coordinates."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
 
 
 def is_laid_out(url: str, layout: Sequence[Template]) -> bool:
-    """Return whether a store already has the shape and the attributes of all templates, and no file is missing."""
+    """Return whether a store has the shape and the attributes of all templates, and its layout has no fault."""
     root = document(url)
     is_whole = root is not None and all(_has_shape(url, root, template) for template in layout)
     return is_whole and not any(layout_faults(url))
@@ -155,7 +155,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
     is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
     for name, content in read_many(url, record.files):
         if content is None:
-            if not is_older:  # with an older ``zarr.json``, a run was stopped before it wrote all files
+            if not is_older:  # if ``zarr.json`` is older, a run was stopped before it wrote all files
                 yield Finding("missing", name, "part of the layout; --repair or the next run writes it again")
         elif digest(content) not in record.files[name]:
             yield Finding("damaged", name, "not what was written")

@@ -49,8 +49,8 @@ except ImportError:  # runs then create claims instead of locks
 #: which the run counts as ended; much longer than `BEAT`, because the clocks of two machines may differ.
 BEAT = 10.0
 SILENCE = 60.0
-#: Time in s for which a process tries to acquire a lock. A process that only checks whether the lock is held also
-#: holds the lock for an instant.
+#: Time in s for which a process tries to acquire a lock. Several attempts are needed, because a process that only
+#: checks whether the lock is held also holds the lock for an instant.
 GLANCE = 0.5
 #: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
 #: message is logged.

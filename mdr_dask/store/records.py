@@ -76,7 +76,7 @@ def _warn_of_damaged(url: str, count: int) -> None:
 
 
 def attempts(url: str, series: str) -> dict[BlockIndex, int]:
-    """Return how often the computation of each block has been started."""
+    """Return the number of recorded attempts to compute each block."""
     found: dict[BlockIndex, int] = {}
     for record in records(url, series):
         key = tuple(record["block"])
