@@ -112,7 +112,7 @@ class Refinement:
 
     # The interval of the axis. Outputs are interpolated on the same scale (linear or logarithmic).
     spread: Spread
-    # Largest accepted interpolation error of each output. Relative errors refer to the largest absolute value.
+    # Largest interpolation error of each output. A relative error refers to the largest absolute value along the axis.
     until: Mapping[str, Tolerance]
     at_most: int
 
