@@ -102,7 +102,7 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     assert alone.returncode == 2
     waiting = r"^no (worker|answer of the scheduler) yet, waiting for \d s; giving up after 6 s$"
     assert re.search(waiting, alone.stderr, flags=re.M)
-    last = rf"no worker for \d+ s; {KEPT}, with more --patience if need be$"
+    last = rf"no worker for \d+ s; {KEPT}, if necessary with a larger --patience$"
     assert re.search(last, " ".join(alone.stderr.split()))
 
     first = worker(start, head, address)
@@ -129,6 +129,6 @@ def test_a_run_ends_with_one_message_when_the_scheduler_is_stopped(folder, start
     head.send_signal(signal.SIGSTOP)
     lines = driver.stderr.read().splitlines()
     assert driver.wait() == 2
-    last = rf"no answer of the scheduler for \d+ s; {KEPT}, with more --patience if need be$"
+    last = rf"no answer of the scheduler for \d+ s; {KEPT}, if necessary with a larger --patience$"
     assert re.search(last, " ".join(" ".join(lines).split()))
     assert not any(word in line for line in lines for word in ("Traceback", "asyncio", "Error"))

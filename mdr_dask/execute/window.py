@@ -132,7 +132,7 @@ class TaskWindow:
             raise ClusterError(f"the cluster starts no worker: {complaint}")
         why = f" ({complaint})" if complaint else ""
         if waited > self._patience:
-            raise ClusterError(f"{what} for {waited:.0f} s{why}; {KEPT}, with more --patience if need be")
+            raise ClusterError(f"{what} for {waited:.0f} s{why}; {KEPT}, if necessary with a larger --patience")
         if now - self._reported_at >= REPORT_PAUSE:
             self._reported_at = now
             what = "all workers are gone" if self._had_workers and what == "no worker" else f"{what} yet"

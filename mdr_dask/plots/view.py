@@ -367,7 +367,7 @@ def _panel(title: str, families: Sequence[curves.Family], view: View, output: st
         panel.keys.append(Key(law_name, "#000000", "--"))
     panel.keys += [Key(name, "#404040", "", mark) for name, mark in marked.items()]
     if varying:
-        panel.keys.append(Key(f"varying too: {', '.join(varying)}".replace("_", " "), "none"))
+        panel.keys.append(Key(f"also varying: {', '.join(varying)}".replace("_", " "), "none"))
     return panel
 
 

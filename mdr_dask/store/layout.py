@@ -165,7 +165,7 @@ def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
     """Return a comment that says how to open a study with series, which looks empty if it is opened as one dataset."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
-    text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
+    text = f"the results of each series are in a group: use open_datatree, or open_zarr with {groups}"
     return {"comment": text} if series else {}
 
 

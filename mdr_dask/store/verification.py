@@ -217,7 +217,7 @@ def _faults(group: Group, block: BlockIndex, contents: Mapping[str, bytes | None
             yield from [Finding("missing", file, "a chunk of a block that is done")] if expected else []
         elif digest(content) not in (expected or written):
             is_older = digest(content) in written
-            yield Finding("damaged", file, "of an earlier attempt" if is_older else "not what was written")
+            yield Finding("damaged", file, "from an earlier attempt" if is_older else "not what was written")
 
 
 def _expected(history: Sequence[Mapping[str, str]], status: str, name: str) -> set[str]:

@@ -152,7 +152,7 @@ def test_a_sampled_study_is_drawn_as_points(tmp_path):
     np.testing.assert_allclose(drawn.y, mean.sortby("velocity"), rtol=1e-12)
     np.testing.assert_allclose(drawn.value, drawn.normal_force)
     assert [trace.kind for trace in figure.panels[0].traces] == ["dots"]
-    assert "varying too: normal force" in [key.label for key in described(groups, MU, "velocity").panels[0].keys]
+    assert "also varying: normal force" in [key.label for key in described(groups, MU, "velocity").panels[0].keys]
     assert {trace.kind for trace in described(groups, MU, ("velocity", "normal_force")).panels[0].traces} == {"dots"}
     assert described(groups, MU).panels[0].x.quantity == "normal_force"
 
