@@ -91,7 +91,7 @@ class _Round:
     # Masks for each group. `asked`: cases of the stage. `needed`: cases that need the realisations of this round.
     asked: list[BoolArray]
     needed: list[BoolArray]
-    # Index of the first realisation of the round, and index of the last realisation of the round plus 1.
+    # Index of the first realisation of the round, and the index that follows its last realisation.
     realisations: tuple[int, int]
 
     def cells(self, url: str, retry_failed: bool = False, part: Part | None = None) -> list[Cells]:

@@ -78,7 +78,7 @@ def write_block(
 
 
 def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Return the values and the ledger of a block, as arrays that the caller may change."""
+    """Return the values of a block and its part of the ledger, as arrays that the caller may change."""
     arrays = _arrays(place.url, place.series, place.layout)
 
     async def read() -> list[Any]:
