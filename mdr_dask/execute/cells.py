@@ -25,8 +25,8 @@ class Cells:
     # Masks with the shape of the group. `wanted`: results to compute. `spared`: results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
-    # `kept`: number of results of the round that are left unchanged in the store. `failed`: number of failed and not
-    # converged results among the unchanged results.
+    # `kept`: number of results of the round that are left unchanged in the store. `failed`: number of those among them
+    # that failed or did not converge.
     kept: int
     failed: int
 

@@ -33,8 +33,8 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
 #: Environment variables that limit libraries for linear algebra to one thread when these libraries are imported.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: A child process is killed if a block takes longer than the sum of the time limits of its results plus this time in
-#: s. A case in plain Python normally raises TimeoutError earlier, at the time limit of the case.
+#: Time in s that a block may take in addition to the time limits of all its results, before its child process is
+#: killed. A case in plain Python normally raises TimeoutError earlier, at the time limit of the case.
 GRACE = 1.0
 #: If this number of realisations of a case have crashed, the other realisations of the case are marked as failed and
 #: are not computed.
@@ -132,7 +132,7 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 def serve(model: str, numbers: list[int]) -> None:
     """Import the modules that blocks need, and run one child for each pipe until the driver closes the pipe."""
-    # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
+    # only the driver reacts to Ctrl-C
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(Exception):  # the error is reported when the first block raises it again
         models.load(model)

@@ -149,7 +149,7 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
 
 
 def cluster_class(name: str) -> type[Cluster]:
-    """Return the class of Dask clusters with a dotted name; raise ClusterError if there is no such class."""
+    """Import the class of a Dask cluster by its dotted name; raise ClusterError if there is no such class."""
     package, _, attribute = name.rpartition(".")
     try:
         found = getattr(import_module(package), attribute)

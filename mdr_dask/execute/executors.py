@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Number of blocks submitted at a time for each thread. With more than one block, no thread waits for a new block.
+#: Number of submitted blocks for each thread. While a thread computes one block, the next block is already waiting.
 AHEAD = 2
 
 

@@ -222,7 +222,7 @@ class _Run:
             time.sleep(LOOK)
 
     def mark_rest(self, stage: Stage, realisations: int) -> None:
-        """After the last stage, mark results that no stage needed as not needed."""
+        """After the last stage, give the state "not needed" to the results that no stage has computed."""
         layout, places = stored_layout(stage, self.url)
         asked = cases_of(stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in stage.meshes])
         rest = _Round(layout, asked, [np.zeros_like(mask) for mask in asked], (0, realisations))

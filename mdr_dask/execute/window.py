@@ -24,7 +24,7 @@ from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
 CHECK_PAUSE = 1.0
 #: Time in s between two messages which say that the cluster has no worker.
 REPORT_PAUSE = 3.0
-#: Time in s to wait for an answer from the scheduler, or for a finished result from a worker.
+#: Time in s to wait for an answer from the scheduler, or for the transfer of a result from a worker.
 ANSWER_LIMIT = 3.0
 #: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"

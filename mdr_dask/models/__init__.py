@@ -86,7 +86,7 @@ def _digest(compute: Callable[..., Any]) -> str | None:
     return hashlib.blake2b(code.encode(), digest_size=8).hexdigest()
 
 
-_digest_at_import = lru_cache(_digest)  #: cached since the import of the model, when `_own` makes the first call
+_digest_at_import = lru_cache(_digest)  #: `_own` calls this when it imports a model; the result is cached
 
 
 @lru_cache(maxsize=1)

@@ -330,8 +330,8 @@ class Model(Generic[P]):
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
     campaign.
     * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
-    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets: one set for each of
-    some values of every axis. A nested parameter set can have its own method `notes`.
+    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets, each with another
+    value of one of the axes. A nested parameter set can have its own method `notes`.
     """
 
     name: str

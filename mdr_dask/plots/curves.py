@@ -117,10 +117,10 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
     """Split a series into curves against the parameter `along`.
 
     The curves differ in the parameter `by`. Without `by`, there is a curve for every combination of values of the other
-    axes, or for every value of the longest of these axes if there would be more curves than colours. Every remaining
-    axis is fixed at the middle value. If the axis in which the curves differ has more values than there are colours, a
-    colour bar shows the values; if the values are words, some curves are left out instead. The label of each curve
-    begins with the name `series`. The first curve gets the colour with the index `first`.
+    axes. If this would give more curves than colours, the curves differ only in the longest of these axes. Every
+    remaining axis is fixed at the middle value. If the axis in which the curves differ has more values than there are
+    colours, a colour bar shows the values; if the values are words, some curves are left out instead. The label of each
+    curve begins with the name `series`. The first curve gets the colour with the index `first`.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")

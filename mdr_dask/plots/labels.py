@@ -166,7 +166,7 @@ def named(name: str, value: xr.DataArray) -> str:
 
 
 def short(number: float) -> str:
-    """Return a number with four digits, such as ``12340``. Only numbers from 1e10 or below 1e-4 have an exponent."""
+    """Return a number with four digits, such as ``12340``. Numbers of 1e10 or more, or below 1e-4, have an exponent."""
     return f"{float(f'{number:.4g}'):.10g}"
 
 

@@ -26,7 +26,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: Any
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Return the series with the table of measurements in `file`, and the figures with the points of this table."""
+    """Return series that also hold the measurements in `file`, and figures that also draw the measured points."""
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
 

@@ -97,7 +97,7 @@ def figure_of(
     panels: str = "",
     log: str | None = None,
 ) -> Plot:
-    """Return the figure of an output. If `over` is empty, `main_axis` replaces it. `View` explains the arguments."""
+    """Return the figure of an output. `View` explains the arguments. An empty `over` means the `main_axis`."""
     view = View(output, over or main_axis(groups, output, (by, panels)), by, panels, log)
     summary = f"{output} against {' and '.join(view.along)}".replace("_", " ")
     return Plot(output, (), summary, lambda groups: draw(groups, view))

@@ -43,7 +43,7 @@ class Place:
     index: BlockIndex
     # The part of the arrays that the block fills: one slice for each dimension, the last one for ``realisation``.
     region: tuple[slice, ...]
-    # The result of `layout_mark` in the main process of the run. A worker with another result writes nothing.
+    # The result of `layout_mark` in the main process of the run. A worker that gets another result raises an error.
     layout: str
     lock: Lock
 
@@ -90,7 +90,7 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
-    """Return the current values of one output of a group, with the axes in the order of the store."""
+    """Return the current values of one output of a group. The order along each axis is the stored order."""
     (held,) = _opened(url, series, bytes_of(url), [output]).values()
     with guarded(url, f"reading {output}"):
         return np.asarray(held[...])
@@ -130,6 +130,6 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
 
 
 def layout_mark(url: str) -> str | None:
-    """Return a text that changes whenever a study is laid out again, or None if there is no store."""
+    """Return a text that changes whenever ``zarr.json`` changes, or None if there is no store."""
     content = read_bytes(url, "zarr.json")
     return None if content is None else hashlib.blake2b(content, digest_size=16).hexdigest()

@@ -24,7 +24,7 @@ from mdr_dask.errors import MdrDaskError, StoreError
 
 T = TypeVar("T")
 
-#: Name of the group at the root if the store also has series.
+#: Name that stands for the group at the root of a store if the store also has series.
 ROOT = "-"
 #: Folder with claims: lock files for servers and file systems that have no locks of their own.
 CLAIMS = ".claims/"
@@ -337,7 +337,7 @@ def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file."""
-    # a CRC could not distinguish chunks: they end with the CRC of their other bytes, so all have the same CRC
+    # the CRC of a whole chunk is the same for all chunks, because a chunk ends with the CRC of its other bytes
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
@@ -348,7 +348,7 @@ def with_digest(document: Mapping[str, Any]) -> bytes:
 
 
 def without_digest(line: bytes) -> dict[str, Any] | None:
-    """Return a document without the digest, or None if the document is damaged. A missing digest is no damage."""
+    """Return the document in a line of JSON without its digest, or None if it is damaged. The digest may be missing."""
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

@@ -165,7 +165,7 @@ def _by_digest(value: Any) -> Any:
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Append the new values of a series to the stored values. Also return the positions of all values of the series."""
+    """Append the new values of a series to its stored axes, and return the positions of its values on these axes."""
     places = {}
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
@@ -209,7 +209,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Convert the stored form of a value of an axis back to the value. Lists and mappings are validated."""
+    """Convert a value of an axis from its stored form to its original form. Lists and mappings are validated."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

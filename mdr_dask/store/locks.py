@@ -52,8 +52,8 @@ SILENCE = 60.0
 #: Time in s for which a process tries to acquire a lock. Several attempts are needed, because a process that only
 #: checks whether the lock is held also holds the lock for an instant.
 GLANCE = 0.5
-#: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
-#: message is logged.
+#: `POLL`: time in s between two attempts to acquire a lock. If a process waits for the gate for more
+#: than `PATIENCE` s, it logs a message.
 POLL, PATIENCE = 0.05, 4.0
 #: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
@@ -216,7 +216,7 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
     """Raise StoreBusyError if a run no longer holds the given lock, and StoreError if the store can only be read.
 
-    No other run can acquire a lock of the operating system until this context ends. A claim is checked only once.
+    While the context lasts, no other run can take over a lock of the operating system. A claim is checked only once.
     """
     if not lock.owner:
         raise StoreError(f"{url}: the study is not finished, and nothing can be written here (permission denied)")

@@ -14,13 +14,13 @@ from mdr_dask.store.files import listed, read_many
 from mdr_dask.store.layout import Finding
 from mdr_dask.store.verification import CHECKSUMS, Inspection, of_store, verify
 
-#: Largest accepted ratio of the size of a file to its size in the zip, for files of more than `SMALL` bytes, so that no
-#: zip fills the disk. The ratio is about 1 for chunks, which are compressed already, and 10 for metadata.
+#: A zip that might fill the disk is refused: a file of more than `SMALL` bytes may be at most `LARGEST_RATIO` times as
+#: large as its compressed form. The ratio is about 1 for chunks, which are compressed already, and 10 for metadata.
 LARGEST_RATIO, SMALL = 100, 2**20
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and the content of every file of a study, without files of active runs and of the publication."""
+    """Yield the name and the content of every file of a study, without temporary, lock and ``published/`` files."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content

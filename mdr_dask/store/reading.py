@@ -48,7 +48,7 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
     The values of numeric axes are in ascending order. The group of a study without series has the name ``""``, or
-    ``"-"`` if an earlier version of mdr_dask has added series. Groups larger than `LAZY_BYTES` contain Dask arrays.
+    ``"-"`` if an earlier mdr_dask has added series to the study. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
     with readable(url):
         names = series_names(url)
@@ -86,7 +86,7 @@ def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # without this attribute, no run extends the copy
+        if value is not None and name != "mdr_dask_layout"  # so that no run can extend the copy
     }
     return plain
 

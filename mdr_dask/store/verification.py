@@ -30,7 +30,7 @@ from mdr_dask.store.study import attributes, document, group_of, refuse_file
 
 #: Ending of temporary files, which do not belong to the study.
 IGNORED = ".partial"
-#: Folder with the files of a published store that do not belong to the study itself.
+#: Folder with the files that ``mdr-dask publish`` adds to the files of a study.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
 
