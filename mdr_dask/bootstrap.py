@@ -24,8 +24,6 @@ GROUPS = 32
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
 #: Smallest number of resamples from which the ends of an interval are computed.
 FEWEST = round(1 / TAILS[0])
-#: Value that replaces the logarithm of a number that is not positive. In double precision, exp(NOTHING) is 0.
-NOTHING = -1000.0
 
 
 @lru_cache(maxsize=8)
@@ -90,9 +88,8 @@ def difference(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def logarithms(stack: FloatArray) -> FloatArray:
-    """Return the logarithms of a stack of a positive quantity; values that are not positive become `NOTHING`."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        logs: FloatArray = np.where(stack <= 0, NOTHING, np.log(stack))
+    """Return the logarithms of a stack of a positive quantity; the smallest float replaces values below it."""
+    logs: FloatArray = np.log(np.maximum(stack, np.finfo(float).tiny))
     return logs
 
 

@@ -16,20 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
+from mdr_dask.bootstrap import CONFIDENCE, GROUPS
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Number of groups of realisations for the jackknife, which leaves out one group after the other and estimates the
-#: scatter of a mean from the means of the rest. With 20 groups, the scatter is known to about 15 %.
-GROUPS = 20
-#: Probability that an interval is halved because of scatter alone.
-CHASED = 0.05
 #: Least width of an interval, as a fraction of the axis. This width limits the number of values at a discontinuity.
 FINEST = 2.0**-10
 #: Intervals are always halved until one end has at least this level: 1 is the middle of the axis, 2 are its quarters,
 #: and 3 its eighths. The quarters are predicted from only three values, and the prediction may be right by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
-#: the end that was added to the axis later, as fractions of the length of the interval.
+#: the end that was added to the axis later, as fractions of the length of the interval. Chosen by trial.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
@@ -275,6 +271,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     count = max(len(groups) - 1, 1)
     around = missed[:, 1:] - missed[:, :1]
     scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; zero for one realisation
-    widely = ndtri(1 - CHASED / (2 * groups.shape[1]))
+    # with the probability 1 - CONFIDENCE, scatter alone halves an interval
+    widely = ndtri(1 - (1 - CONFIDENCE) / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])

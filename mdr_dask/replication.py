@@ -18,8 +18,6 @@ LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Least number of results with which the estimated standard error alone decides whether a case stops. With fewer
 #: results, only 89 % of the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
 FEWEST = 12
-#: A case also stops if its standard error is below this fraction of the tolerance.
-NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
@@ -42,8 +40,8 @@ def growth_needed(
     `values` and `scatter` (the standard error estimated within each realisation) have the shape (..., realisations).
     `until` limits the standard error of the mean of each output. A case has enough results if the standard error is
     within the tolerance and one of three conditions is met: there are `FEWEST` results; the standard error that follows
-    from `scatter` is within the tolerance; or the standard error is negligible (`NEGLIGIBLE`). The factor is 0 for a
-    case without a successful result.
+    from `scatter` is within the tolerance; or the standard error is a rounding error. The factor is 0 for a case
+    without a successful result.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -52,7 +50,8 @@ def growth_needed(
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
         enough = count * _times(error, allowed)
-        sufficient = [np.maximum(FEWEST, enough), count * _times(error, NEGLIGIBLE * allowed)]
+        rounding = np.minimum(allowed, np.sqrt(np.finfo(float).eps) * np.abs(mean))
+        sufficient = [np.maximum(FEWEST, enough), count * _times(error, rounding)]
         if scatter and name in scatter:
             within = _error_from_within(scatter[name], done)
             sufficient.append(np.maximum(enough, count * _times(within, allowed)))

@@ -25,7 +25,9 @@ WITHIN = 0.05
 APPROXIMATE = 0.15
 #: Deviations count against a law if scatter and errors alone would cause such deviations with a probability below this
 #: value.
-DOUBTFUL = 0.05
+DOUBTFUL = 1 - bootstrap.CONFIDENCE
+#: A number that is added to 1 in quadrature changes the 1 by less than `WITHIN` if it is below this value.
+SMALL = float(np.sqrt((1 + WITHIN) ** 2 - 1))
 
 
 @dataclass(frozen=True)
@@ -124,11 +126,12 @@ def fitted(
     residuals = left(data, constants)
     if not bootstrap.chance(residuals, count) >= DOUBTFUL:
         constants = np.concatenate([constants, fit(bootstrap.moved(data[0], residuals[0]))])
-    step = 1e-4 * np.eye(constants.shape[1])
+    size = float(np.cbrt(np.finfo(float).eps))
+    step = size * np.eye(constants.shape[1])
     free = np.zeros(constants.shape[1], dtype=bool)
     for about in (constants[0], constants[0] if stated is None else stated):
         effects = [left(data[:1], about[None] - each) - left(data[:1], about[None] + each) for each in step]
-        free |= undetermined(np.concatenate(effects).T / 2e-4)
+        free |= undetermined(np.concatenate(effects).T / (2 * size))
     constants = np.where(free, np.nan, constants)
     return Fitted(constants, residuals, count)
 

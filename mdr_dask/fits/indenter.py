@@ -13,14 +13,11 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, require, short
+from mdr_dask.fits.base import SMALL, Fit, require, short
 from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonlinear, one_value, table_of
 from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-
-# the law applies if the rms slope of the indenter in contact is at most this fraction of the slope s of the roughness
-BODY = 0.3
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
@@ -62,12 +59,13 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The indenter must be much less steep than the roughness (`BODY`), and be pressed in by at least the rms height. The
-    velocity must not exceed the velocity at which friction is largest.
+    The slope of the indenter, whose square is added to that of the roughness, must be `SMALL` compared with the slope
+    of the roughness. The indenter must be pressed in by at least the rms height. The velocity must not exceed the
+    velocity at which friction is largest.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
-    flat = coefficient * exponent * width ** (exponent - 1) / np.sqrt(2 * exponent - 1) <= BODY * slope
+    flat = coefficient * exponent * width ** (exponent - 1) / np.sqrt(2 * exponent - 1) <= SMALL * slope
     deep = coefficient * width**exponent >= data["rms_roughness"]
     within = flat & deep
     if "velocity" in data[FRICTION].dims:

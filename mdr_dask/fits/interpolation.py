@@ -15,8 +15,8 @@ FEWEST = 4
 #: Error of interpolation with all values, divided by the error with every second value only. The ratio is 1/4 for an
 #: error of second order, and 1/2 at a kink.
 LEFT = 0.25
-#: `LARGEST`: largest number of values in a dense table. `PIECES`: largest number of steps into which the interval
-#: between two computed values of an axis is divided.
+#: `LARGEST`: largest number of values in a dense table; these are 16 MB. `PIECES`: largest number of steps into which
+#: the interval between two computed values of an axis is divided; it reduces the error of straight lines 256 times.
 LARGEST, PIECES = 2_000_000, 16
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, verdict
+from mdr_dask.fits.base import SMALL, Fit, verdict
 from mdr_dask.fits.cases import (
     Series,
     Variables,
@@ -38,9 +38,9 @@ MODELS = ("velocity_jump",)
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 
 LAW = 0.4  # the constant c of eq. 4.11, as stated in the thesis
-# a case with mu_1 / s below this value is in region I; there, eqs. 4.9 and 4.11 differ by less than 3 %
-REGION_ONE = 0.1
-PLATEAU = 1.1  # a case with mu_1 / s above this value is on the plateau of friction, where mu_1 / s is 1.26 to 1.44
+# a case with mu_1 / s below this value is in region I; there, eqs. 4.9 and 4.11 differ by less than WITHIN
+REGION_ONE = LAW * SMALL
+PLATEAU = LAW / SMALL  # above this value of mu_1 / s, eqs. 4.10 and 4.11 differ by less than WITHIN
 
 NUMBERS = {
     "before_over_slope": "mu_1 / rms_slope",

@@ -44,7 +44,7 @@ from mdr_dask.fits.friction import (
 )
 from mdr_dask.physics.sliding import laws
 
-KNOTS = 2  # number of knots of the common curve per decade of velocity
+KNOTS = 2  # number of knots of the common curve per decade of velocity; chosen by trial
 SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slope in contact"
 
 

@@ -19,8 +19,6 @@ from mdr_dask.errors import FitError
 
 #: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
-#: Smallest number of base points from which an index is computed. At least this number of cases must have a value.
-FEWEST = 16
 
 
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
@@ -80,8 +78,8 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
     mean = np.nansum(values, axis=0) / np.where(number, number, np.nan)
     values = np.where(np.isnan(values), mean, values)
     known = number > 0
-    if known.sum() < FEWEST:
-        raise FitError(f"{output}: expected at least {FEWEST} cases with a value, got {int(known.sum())}")
+    if not known.any():
+        raise FitError(f"{output}: no case has a value")
     if np.ptp(mean[known]) == 0:
         raise FitError(f"expected an output that varies, but {output} is the same in every case")
     return values, int((~known).sum())
@@ -117,8 +115,8 @@ def _exchanged(values: FloatArray) -> FloatArray:
     The last dimension contains the outputs at point a, at point b, and at point a with the input of point b.
     """
     a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
-    if a.shape[1] < FEWEST:
-        raise FitError(f"expected at least {FEWEST} base points without a failed case, got {a.shape[1]}")
+    if a.shape[1] < 2:  # the jackknife leaves out one point
+        raise FitError("expected at least three base points without a failed case")
     variance = (_product(a, a) + _product(b, b)).mean() / 2 - ((a.mean() + b.mean()) / 2) ** 2
     first, total = _product(b, mixed - a).mean(), _product(a - mixed, a - mixed).mean() / 2
     found: FloatArray = np.array([first, total]) / variance

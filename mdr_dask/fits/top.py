@@ -10,9 +10,10 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most a fraction of the maximum. The first
-#: fraction in `TOPS` for which scatter and errors explain the residuals is used, or the last fraction if there is none.
-TOPS = (0.3, 0.2, 0.1, 0.05)
+#: A parabola is fitted to the points that are below the maximum by at most this fraction of the maximum. The fraction
+#: is halved until scatter and errors explain the residuals, or until three points are left. Chosen by trial: with a
+#: larger fraction, the scatter of a few lines hides that the curve is no parabola.
+TOP = 0.3
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
@@ -38,12 +39,11 @@ class Top(NamedTuple):
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     """Fit a parabola to a stack of friction against x = ln(velocity), ascending, near the largest friction."""
-    for drop in TOPS:
+    drop, left = 2 * TOP, stack
+    while left is stack or (left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL):
+        drop /= 2
         near = _about_the_top(stack[0], drop)
         top, at, rise, left = _parabola(x[near], stack[:, near])
-        if left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL:
-            continue
-        break
     resamples = top[1 : 1 + bootstrap.RESAMPLES]  # a resample that contains only failed lines is NaN
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:

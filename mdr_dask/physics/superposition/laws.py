@@ -17,9 +17,6 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.physics.solids import GAS_CONSTANT
 
-STRAIGHTEST = 1e-5
-"""Ratio of the range of temperature to c2 below which factors count as linear in temperature."""
-
 
 @dataclass(frozen=True)
 class ShiftLaw:
@@ -73,8 +70,9 @@ def fit_wlf(
     c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
-    straight = STRAIGHTEST / float(np.ptp(temperature))
-    steepest = (1 - 1e-9) / lowest if lowest > 0 else np.inf
+    rounding = float(np.sqrt(np.finfo(float).eps))
+    straight = rounding / float(np.ptp(temperature))  # below this value of 1 / c2, factors are linear in temperature
+    steepest = (1 - rounding) / lowest if lowest > 0 else np.inf
 
     def law(constants: FloatArray, at: FloatArray) -> FloatArray:
         distance = at - temperature[anchor]

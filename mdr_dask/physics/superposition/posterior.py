@@ -29,9 +29,6 @@ ORDER = 4
 CELLS = 8
 """Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
 
-MARGIN = 0.5
-"""Distance by which the spline extends on each side beyond the curves at their most probable shifts, in widths."""
-
 ROUNDING = 1e-5
 """Smallest scatter of a curve, decades: the rounding of a table with five digits."""
 

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.special import softmax
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.superposition.posterior import CELLS, MARGIN, Curves, Solved, solve, step_covariance
+from mdr_dask.physics.superposition.posterior import CELLS, STEP_SCATTER, Curves, Solved, solve, step_covariance
 
 HOPS = 2
 """Number of jumps after each move; a jump changes the step between two neighbouring curves."""
@@ -26,9 +26,6 @@ CONVERGED = 1.1
 
 PATH, STEPS = 1.5, 3
 """Length of a move in standard deviations (about a quarter of a period, pi/2), and number of steps of a move."""
-
-DIFFERENCE = 1e-3
-"""Step of the finite differences of the gradient, in standard deviations of the prior."""
 
 
 def first_guess(curves: Curves) -> FloatArray:
@@ -60,9 +57,12 @@ def first_guess(curves: Curves) -> FloatArray:
 
 
 def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
-    """Return the curves with as many spline coefficients as the shifted curves need, with a margin on both sides."""
+    """Return the curves with as many spline coefficients as the shifted curves need.
+
+    On both sides the spline is longer than the shifted curves by the prior scatter of a step.
+    """
     moved = curves.x + np.append(0.0, shifts)[curves.member]
-    return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
+    return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * STEP_SCATTER) * CELLS)) + 3)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # moves that diverge are rejected
@@ -169,7 +169,7 @@ def _best(curves: Curves, start: FloatArray, fixed: int = 0) -> FloatArray:
 def _scale(curves: Curves, best: FloatArray) -> FloatArray:
     """Return a matrix S such that S S^T approximates the covariance of the parameters."""
     known = curves.prior[1]
-    step = DIFFERENCE / np.sqrt(np.diag(known))
+    step = np.cbrt(np.finfo(float).eps / np.diag(known) ** 1.5)  # balances rounding and truncation
     rows = np.concatenate([best + np.diag(step), best - np.diag(step)])
     plus, minus = np.split(solve(curves, rows).gradient, 2)
     bend = (plus - minus) / (2 * step[:, None])
