@@ -4,17 +4,17 @@ import importlib
 import os
 import sys
 
-#: One thread for linear algebra, as in the runner's workers, because waiting threads would count as processor time.
+# one thread for linear algebra, as in the workers of a run, because waiting threads would count as processor time
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 #: Kinds by name, with the module whose `main` runs the benchmark, and a one-line description.
 KINDS = {
     "accuracy": ("benchmarks.accuracy", "error, time and stated errors of every solver: docs/accuracy-and-speed.md"),
-    "campaigns": ("benchmarks.campaigns", "error and time of whole campaigns that are given an accuracy"),
-    "peers": ("benchmarks.peers", "solvers beside other programs: docs/comparison.md"),
-    "runner": ("benchmarks.runner.compare", "the runner beside joblib, dask, xyzpy and pipefunc, and after a kill"),
-    "validity": ("benchmarks.surfaces.validity", "the method beside a half-space: docs/validity.md"),
-    "persson": ("benchmarks.surfaces.persson", "friction of lines beside Persson's theory: docs/validity.md"),
+    "campaigns": ("benchmarks.campaigns", "error and time of whole campaigns that request an accuracy"),
+    "peers": ("benchmarks.peers", "solvers compared with other programs: docs/comparison.md"),
+    "runner": ("benchmarks.runner.compare", "runs compared with joblib, dask, xyzpy and pipefunc, also after a kill"),
+    "validity": ("benchmarks.surfaces.validity", "the method compared with a half-space: docs/validity.md"),
+    "persson": ("benchmarks.surfaces.persson", "friction of lines compared with Persson's theory: docs/validity.md"),
     "road": ("benchmarks.surfaces.road", "the generated road of campaigns/road.yaml"),
     "high_speed": ("benchmarks.high_speed", "friction at very high velocity: docs/high-speed.md"),
     "thesis": ("benchmarks.thesis.page", "the thesis, claim by claim: docs/thesis.md"),

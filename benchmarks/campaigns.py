@@ -3,9 +3,9 @@
 python -m benchmarks campaigns             all models, four campaigns for each accuracy; prints a table
 python -m benchmarks campaigns wear 1      one model, one campaign for each accuracy
 
-The runner computes each campaign into a store on disk, on one thread. The campaign requests an accuracy, and the same
-standard error if its lines are random. The error includes grid and lines. It is the rms over cases and campaigns,
-relative to a reference campaign with finer settings and other lines.
+Each campaign is computed into a store on disk, on one thread. The campaign requests an accuracy and, if its lines are
+random, a relative standard error of the same size. The error is due to the grid and to the scatter of the lines. It is
+the rms over cases and campaigns, relative to a reference campaign with finer settings and other lines.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Friction at very high velocity, for the figure of docs/high-speed.md: ``python -m benchmarks high_speed [PNG]``.
 
-There are twenty lines with H = 0.7 and 1000 Nyquist points, at F_N / (G h L) = 0.3. The numbers in the page are
-printed.
+There are twenty lines with H = 0.7 and 1000 Nyquist points, at F_N / (G h L) = 0.3. The command also prints the numbers
+in the text of the page.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def main(path: str = "docs/pictures/high-speed.png") -> None:
             highest = int(np.argmax(nodes))
             plateaus[oversampling].append((nodes[highest] - nodes[highest - 1]) * nodes.size)
         solid = []
-        for deborah in DEBORAH:  # sum of G_m tau_m as for the dashpot: equal friction at low v
+        for deborah in DEBORAH:  # G_m tau_m is G tau of the Kelvin solid: equal friction at low velocity
             terms = PronyTerms((GLASS - 1,), (deborah / (GLASS - 1),))
             solid.append(solve(rough, terms, np.zeros(1), loads[:1], Request(0.02))[0].drag[0] / LOAD)
         curves.setdefault(f"standard solid, glassy modulus {GLASS:g} G", []).append(np.array(solid))
@@ -65,7 +65,7 @@ def single_tip(curvature, force, viscosity, velocity):
 
 
 def _thesis() -> float:
-    """Return the mean rise to the highest node of the lines of the thesis, over their rms slope."""
+    """Return the mean of (h_top - h_before) / (dx slope) over 200 lines, on the grid of the thesis."""
     amplitude = roughness.amplitudes(2500, HURST)
     rises = []
     for line in range(200):

@@ -49,7 +49,7 @@ def tamaas(height: np.ndarray, width: float, force: float, tolerance: float = 1e
 
 
 def contact_mechanics(height: np.ndarray, width: float, force: float, tolerance: float = 1e-6) -> Pressed:
-    """Press a surface against a half-space with ContactMechanics; the tolerance is penetration over height range."""
+    """Press a surface against a half-space with ContactMechanics; the tolerance is relative to the range of heights."""
     from ContactMechanics import FreeFFTElasticHalfSpace
     from ContactMechanics.Systems import NonSmoothContactSystem
     from SurfaceTopography import Topography

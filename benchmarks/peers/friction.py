@@ -26,7 +26,7 @@ CASES = {
     "transition": (0.7, 0.3, 0.003),
     "few peaks": (0.3, -2.0, 0.003),
 }
-#: Sliding time in relaxation times, and the share of it, at the end, over which friction is averaged.
+#: Sliding time in relaxation times; the last fraction of this time over which friction is averaged.
 WAY, LAST = 12, 0.1
 
 
@@ -50,7 +50,7 @@ def stepped(line, deborah: float, load: float, nodes: int) -> float:
 
 
 def _carrying(load: float, summits: np.ndarray, depth: float) -> float:
-    """Return the depth at which springs carry a mean load, a piecewise linear function of the depth.
+    """Return the depth at which springs carry a mean load. The load is a piecewise linear function of the depth.
 
     `summits` are the heights of the springs in rising order.
     """

@@ -16,7 +16,7 @@ from mdr_dask.physics.surfaces.spectrum import self_affine
 from mdr_dask.physics.surfaces.waves import series, waves_of
 
 POINTS, SIDE, HURST = 2**16, 512, 0.8
-#: Number of points per shortest wavelength.
+#: Numbers of points per shortest wavelength.
 SHORTEST = {"smooth": 8, "to the grid": 2}
 
 

@@ -1,4 +1,4 @@
-"""Families of measured lines that are hard for a solver of Fourier lines; also used by tests."""
+"""Families of measured lines that are difficult for a Fourier series; also used by tests."""
 
 import numpy as np
 

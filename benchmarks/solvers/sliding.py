@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.surfaces.waves import Waves, waves_of
 
 MODES = 64
-AGREED, WORK = 1e-6, 2**21  # for the reference: relative change between grids; largest cells x Prony terms
+AGREED, WORK = 1e-6, 2**21  # for the reference: allowed change between grids; largest product of cells and Prony terms
 DOUBT = 1e-3  # cases in which the reference has a larger relative error are left out
 
 
@@ -99,7 +99,7 @@ def general(count: int | None, random: np.random.Generator):
 
 
 def measured(general: bool, random: np.random.Generator):
-    """Draw a measured line that is hard for Fourier series, with a Kelvin solid or a solid of Prony terms."""
+    """Draw a line that is difficult for a Fourier series, with a Kelvin solid or a solid of Prony terms."""
     height = samples(str(random.choice([name for name in FAMILIES if name != "odd"])), random)
     line, deborah, terms = RoughLine(waves_of(height)), 0.0, None
     if general:

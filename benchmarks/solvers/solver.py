@@ -35,9 +35,9 @@ class Found(NamedTuple):
 class Solver:
     """One solver of the package, and other methods for comparison.
 
-    docs/accuracy-and-speed.md defines the error and the truth. A function of `families` draws a case and its truth, or
-    returns None if the case has no solution. A function of `methods`, by method and setting, solves a case, or returns
-    None if the method does not apply. Of `rounds` calls the least time counts, because the first call may compile.
+    docs/accuracy-and-speed.md defines the error and the reference (here `Truth`). A function of `families` draws a case
+    and its truth, or returns None if the case has no solution. A function of `methods`, by method and setting, solves a
+    case, or returns None if the method does not apply. A time is the least of `rounds` calls; the first may compile.
     """
 
     name: str

@@ -42,7 +42,7 @@ class JumpCase(NamedTuple):
         return solve_jumps(RoughLine(self.waves), loads, deborah, accuracy, oversampling, march, bool(march))
 
     def marched(self, oversampling: int, per_decade: float) -> Found | None:
-        """Return the transient by the march of the models, over the steady friction after the jump."""
+        """Return the transient by the march of the models, divided by the steady friction after the jump."""
         found = self.jumped(0.01, oversampling, per_decade)
         if found.outcome[0] != Outcome.CONVERGED:
             return None
@@ -50,7 +50,7 @@ class JumpCase(NamedTuple):
         return Found((found.trace[0] - last) / last, found.trace_error[0] / last)
 
     def levels(self, accuracy: float) -> Found | None:
-        """Return friction before the jump, jump, and friction after it, over the friction after it."""
+        """Return friction before the jump, the jump, and friction after it, divided by the friction after it."""
         found = self.jumped(accuracy, 4, None)
         if found.outcome[0] != Outcome.CONVERGED:
             return None
@@ -86,7 +86,7 @@ class JumpCase(NamedTuple):
 
 
 def relaxing(moments: np.ndarray, drag: np.ndarray) -> np.ndarray:
-    """Return the transient at `TIMES`, over the drag at the end."""
+    """Return the transient at `TIMES`, divided by the drag at the end."""
     return (np.interp(TIMES, moments, drag) - drag[-1]) / drag[-1]
 
 

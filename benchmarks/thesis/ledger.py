@@ -1,6 +1,6 @@
 """Studies by which claims of the thesis are tested, and verdicts that come from fits.
 
-A verdict is a sentence that begins with a word of the scale of `law_holds` of the fits.
+A verdict is a text that begins with "yes", "approximately", "no" or "not tested", like `law_holds` of the fits.
 """
 
 from __future__ import annotations

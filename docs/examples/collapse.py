@@ -1,4 +1,4 @@
-"""Eq. 3.23: friction at all loads is one curve of the velocity over a crossover velocity.
+"""Eq. 3.23: friction at all loads is one curve, if the velocity is divided by a crossover velocity.
 
 python docs/examples/collapse.py results/friction_force.zarr collapse.png
 """

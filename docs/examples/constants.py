@@ -11,7 +11,7 @@ import xarray as xr
 
 import mdr_dask
 
-#: Constants of two fits, and the laws of the thesis that they are compared with.
+#: For each constant: the fit, and the law of the thesis with which the constant is compared.
 CONSTANTS = {
     "alpha": ("zone_one", "H / (1 + H), eq. 3.13", lambda hurst: hurst / (1 + hurst)),
     "beta": ("zone_one", "1.6", lambda hurst: 1.6 + 0 * hurst),

@@ -16,14 +16,14 @@ from mdr_dask.models.base import Block
 from mdr_dask.models.parts.sliding_problem import sliding_problems
 from mdr_dask.plots.curves import parameters_at
 
-#: Places for each point of the line, and the part of the line that is shown enlarged.
+#: Number of drawn positions for each point of the line, and the fraction of the line that the lower panel shows.
 OVERSAMPLING, PART = 8, 0.05
 
 
 def displacement(penetration: np.ndarray, deborah: float) -> np.ndarray:
-    """Return how far a periodic line presses each element in: the largest penetration it has had, faded since then.
+    """Return the displacements of a Kelvin body: the largest of all earlier penetrations, each reduced by recovery.
 
-    `penetration` is depth + height at equidistant places, `deborah` is v tau over their distance.
+    `penetration` is depth + height at equidistant positions, and `deborah` is v tau divided by their distance.
     """
     place = np.arange(2 * penetration.size) / deborah
     with np.errstate(divide="ignore"):

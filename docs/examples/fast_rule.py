@@ -1,4 +1,4 @@
-"""Error of the fast wear rule against the exact one over stick radius and cycles.
+"""Error of the fast rule of wear, relative to the exact rule, against stick radius and number of cycles.
 
 python docs/examples/fast_rule.py results/fast_wear_error.zarr fast_rule.png
 """

@@ -1,4 +1,4 @@
-"""Regimes of a lubricated line contact in the numbers of Moes, with the films of a store.
+"""Map of the regimes of a lubricated line contact over Moes' numbers M and L, with the cases of a store.
 
 python docs/examples/film_regimes.py results/ehl_map.zarr film_regimes.png
 """
