@@ -73,7 +73,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield an array for each group. It holds the number of the part (1 to `count`) to which each result belongs."""
+    """Yield, for each group, an array with the number of the part (1 to `count`) to which each result belongs."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)

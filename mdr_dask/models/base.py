@@ -176,8 +176,8 @@ class Output:
     * `has_error`: whether the solver estimates the discretisation error. The error is stored as a companion, the output
     ``<name>_error``, unless the campaign has ``errors: false``.
     * `comment`: a limitation of the output, stored as its attribute ``comment``.
-    * `scatter`: name of a second output, the standard error of this output in a single realisation. If errors are
-    stored, the second output is stored, too.
+    * `scatter`: name of a second output: the standard error of this output, estimated within each realisation. If
+    errors are stored, the second output is stored, too.
     * `floor`: a value in the unit of the output, for an output that can be zero. If the absolute value of the output is
     below `floor`, the relative error is the absolute error divided by `floor`.
     * `allow_nan`: whether NaN and infinite values are valid. If `allow_nan` is False, a case of a user's own model
@@ -206,7 +206,7 @@ class Output:
 class Number:
     """A dimensionless number that is computed for each case.
 
-    Users can use its name for a column of a table and in conditions. The module `mdr_dask.questions.expression`
+    Users can use its name as a column of a table and in conditions. The module `mdr_dask.questions.expression`
     evaluates `formula`. The formula may contain outputs, other numbers and parameters. In a formula, the nested
     parameter ``indenter.angle`` is called ``indenter_angle``.
     """

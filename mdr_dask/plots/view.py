@@ -104,7 +104,7 @@ def figure_of(
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
-    """Draw the outputs of views, several outputs one above the other.
+    """Draw the outputs of all views, one above the other.
 
     If a view cannot be drawn, the figure states the reason, unless another view shows the same output. If no view can
     be drawn, DataError is raised with the reason for each series.

@@ -1,9 +1,9 @@
 """The Zarr store of a study. Only this package uses Zarr.
 
-Every output is an array over the axes and ``realisation``. The array ``status``, called the ledger, holds the state of
-every result. The process that computes a block writes first a record with the digests of the chunks of the block, then
-one whole chunk of every output, and finally the chunk of ``status``. Readers find all arrays through the ``zarr.json``
-at the root. A run replaces this file in one write.
+Every output is an array. Its dimensions are those of the axes, ``realisation``, and further dimensions of the output.
+The array ``status``, called the ledger, holds the state of every result. The process that computes a block writes first
+a record with the digests of the chunks of the block, then one whole chunk of every output, and finally the chunk of
+``status``. Readers find all arrays through the ``zarr.json`` at the root. A run replaces this file in one write.
 """
 
 from mdr_dask.store.blocks import Place, layout_mark, read_block, values, write_block

@@ -101,7 +101,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names that belong to the study itself, and not to an active run or a publication."""
+    """Yield the names of files of the study itself. Leave out temporary, lock and ``published/`` files."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)):
             yield name
