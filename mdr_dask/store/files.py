@@ -337,7 +337,7 @@ def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) 
 
 def digest(content: bytes) -> str:
     """Return the digest of the content of a file."""
-    # the CRC of a whole chunk is the same for all chunks, because a chunk ends with the CRC of its other bytes
+    # not a CRC: the CRC of a whole chunk is always the same, because a chunk ends with the CRC of its other bytes
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
