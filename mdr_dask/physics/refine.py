@@ -27,6 +27,15 @@ from mdr_dask.physics.outcome import Outcome
 SAFETY = 3.0
 """Roache's safety factor for an estimate from two grids."""
 
+MOST_ITERATIONS = 100
+"""Limit of a search for a root. Fewer bisections reach the accuracy of floating-point numbers."""
+
+EPS = float(np.finfo(np.float64).eps)
+"""Relative rounding error of floating-point numbers."""
+
+CLOSE = float(np.sqrt(EPS))
+"""Newton's method ends after a relative step below this limit. The next step, about the square, would be rounding."""
+
 
 class Estimate(NamedTuple):
     """Computed values, and the estimated absolute error of each value."""

@@ -14,6 +14,7 @@ from scipy.optimize import nnls
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant, J / (mol K)."""
@@ -290,9 +291,9 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
     """Return the distance of a zero lambda_k from the nearest tau_m."""
     high = np.log(gap)
-    low = high - 80.0
+    low = high - 80.0  # exp(-80) is far below the rounding error
     place = 0.5 * (low + high)
-    for _ in range(80):
+    for _ in range(MOST_ITERATIONS):
         offset = np.exp(place)
         total, rate = _imbalance(pole, sign * offset, weight, times)
         if sign * total > 0:
@@ -302,7 +303,7 @@ def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, ti
         following = place - sign * total / (rate * offset)
         if not low < following < high or high - low > 1.0:
             following = 0.5 * (low + high)
-        if abs(following - place) <= 1e-15:
+        place, step = following, following - place
+        if abs(step) <= CLOSE:
             break
-        place = following
     return float(np.exp(place))

@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,11 @@ class TableProfile:
 
     def height(self, radius: FloatArray) -> FloatArray:
         """Return f0(r), or NaN beyond the largest radius."""
-        return np.where(radius <= self.largest_radius * (1 + 1e-12), self.curve(np.asarray(radius)), np.nan)
+        return np.where(radius <= self.largest_radius * (1 + CLOSE), self.curve(np.asarray(radius)), np.nan)
 
     def image(self, position: FloatArray) -> FloatArray:
         """Return g0(x), or NaN beyond the largest radius."""
-        return np.where(position <= self.largest_radius * (1 + 1e-12), self.image_curve(np.asarray(position)), np.nan)
+        return np.where(position <= self.largest_radius * (1 + CLOSE), self.image_curve(np.asarray(position)), np.nan)
 
     def image_slope(self, position: FloatArray) -> FloatArray:
         """Return g0'(x)."""
@@ -152,7 +153,7 @@ def _scaled(curve: PPoly, length: float, height: float) -> PPoly:
 
 def bisect(function: Callable[[float], float], low: float, high: float) -> float:
     """Return the root of an increasing function to machine precision, by bisection."""
-    for _ in range(200):
+    for _ in range(MOST_ITERATIONS):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
@@ -164,7 +165,7 @@ def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
     """Return the cubic spline through the points, or the monotone cubic interpolant if this spline decreases."""
     spline = CubicSpline(x, y)
     fine = (x[:-1, None] + np.diff(x)[:, None] * np.linspace(0.0, 1.0, 9)).ravel()
-    falls = np.any(spline(fine, 1) < -1e-9 * np.max(np.abs(spline(fine, 1))))
+    falls = np.any(spline(fine, 1) < -CLOSE * np.max(np.abs(spline(fine, 1))))
     return PchipInterpolator(x, y) if falls else spline
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.refine import EPS, MOST_ITERATIONS
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +70,12 @@ class UniformGrid:
 
     def depth(self, image: FloatArray, force: float) -> float:
         """Return the depth at which F_N / E* equals `force`, by Newton's method (the force is convex in the depth)."""
-        depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)]))
-        for _ in range(60):
+        depth = float(np.max(image))
+        for _ in range(MOST_ITERATIONS):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)
             change = (force - self.force(image, depth)) / slope
             depth += change
-            if abs(change) < 1e-13:
+            if abs(change) <= EPS * depth:
                 break
         return depth
 

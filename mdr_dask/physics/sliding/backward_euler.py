@@ -21,28 +21,21 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
-from mdr_dask.physics.sliding.cases import Cases, first_depths
-
-ITERATIONS = 200
-COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
-COARSEST = 64  # the search for the depth starts on a grid with at most this number of nodes
-CONVERGED = 1e-9  # allowed product of the last two relative changes of the depth (estimated error of the drag)
-COARSE = 1e-3  # used instead of CONVERGED on all grids except the finest
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
+from mdr_dask.physics.sliding.cases import Cases, first_depths, strides
 
 BLOCK = 256  # number of nodes in a block
 LANES = 8  # number of cases in one vector instruction
 
-# Rows of `Lanes.sums`
-CARRIED, STIFFNESS, DRAG = range(3)
-SUMS = 3
+# Rows of `Lanes.sums`, and the number of these rows
+CARRIED, STIFFNESS, DRAG, SUMS = range(4)
 # Columns of `Nodal.blocks`. STEEPEST is the smallest rise, and BEFORE is the height of the node before the block.
 # HEIGHTS, RISES, WORK and SQUARES are the sums of height, rise, height times rise, and rise squared over the block.
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 # Rows of `Lanes.state`: displacement u (U), and the derivative of u with respect to the depth (FADE).
 # THROUGH is the decay factor of u over a free block. MEMORY is the sum of the decay factors at the nodes of the block.
-# LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block.
-U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
-ROWS = 7
+# LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block. ROWS is the number of rows.
+U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS, ROWS = range(8)
 
 
 class Nodal(NamedTuple):
@@ -212,7 +205,6 @@ def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
 def _newton(
     line: Nodal,
     cases: Cases,
-    tolerance: float,
     depths: FloatArray,
     drags: FloatArray,
     outside: NDArray[np.bool_],
@@ -231,7 +223,7 @@ def _newton(
     workspace, sums = lanes.state, lanes.sums
     drags[:] = np.nan
     ends = 0.0 if line.periodic else 1.0
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         _sweep(line, Moving(deborah[:count], decay[:count], depth[:count]), lanes)
         kept = 0
         for k in range(count):
@@ -241,7 +233,7 @@ def _newton(
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
             earlier = before[0, k] - depth[k]
-            if abs(step * earlier) <= tolerance * depth[k] ** 2:
+            if abs(step * earlier) <= CLOSE * depth[k] ** 2:  # about the error of the extrapolated drag
                 change = (before[1, k] - drag) / earlier * step if abs(earlier) > 0 else 0.0
                 depths[case] = depth[k] + step
                 drags[case] = drag + change
@@ -249,7 +241,7 @@ def _newton(
                 continue
             active[kept], decay[kept], load[kept], deborah[kept] = case, decay[k], load[k], deborah[k]
             before[0, kept], before[1, kept] = depth[k], drag
-            depth[kept] = max(depth[k] + step, 0.25 * depth[k])
+            depth[kept] = depth[k] + step
             kept += 1
         count = kept
         if count == 0:
@@ -290,16 +282,12 @@ def steady_by_steps(
     A periodic line must end at the highest node. Deborah numbers are v tau / dx. Loads are F_N / (4 G dx), in the unit
     of height.
     """
-    strides = [1]
-    while height.size > COARSEST * strides[-1]:
-        strides.append(strides[-1] * COARSENING)
     depths = first_depths(loads / height.size)
     drags, outside = np.empty(loads.size), np.zeros(loads.size, np.bool_)
     top = int(np.argmax(height))
-    for stride in reversed(strides):
+    for stride in strides(height.size):
         coarse = np.ascontiguousarray(height[top % stride :: stride])
         rise = coarse - np.roll(coarse, 1)
-        tolerance = CONVERGED if stride == 1 else COARSE
         line = Nodal(coarse, rise, _blocks(coarse, rise, periodic), periodic)
-        _newton(line, Cases(deborah / stride, loads / stride), tolerance, depths, drags, outside)
+        _newton(line, Cases(deborah / stride, loads / stride), depths, drags, outside)
     return depths, drags, outside

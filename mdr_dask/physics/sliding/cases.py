@@ -13,6 +13,9 @@ from mdr_dask.physics.outcome import Outcome
 
 Scheme = Literal["hermite", "backward_euler"]
 
+COARSENING = 8
+"""Ratio of the numbers of nodes of successive grids in `strides`, chosen by trial: 4 to 16 take about the same time."""
+
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
 """Names of the results of a case, in the order of the rows of an array of results."""
 
@@ -31,6 +34,14 @@ class Cases(NamedTuple):
 def first_depths(loads: FloatArray) -> FloatArray:
     """Return first guesses of the penetration of the highest point, from loads F_N / (4 G L)."""
     return np.maximum(loads, loads ** (2 / 3))
+
+
+def strides(nodes: int) -> list[int]:
+    """Return the strides of the grids, from coarse to fine, on which the depth is searched. The last stride is 1."""
+    found = [1]
+    while nodes > COARSENING**2 * found[-1]:
+        found.append(found[-1] * COARSENING)
+    return found[::-1]
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,14 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is passed in one step
-TINY = 1e-290  # smaller displacements are set to 0
-CLOSE = 1e-8  # Newton's method ends after a step below this part of a cell; the next step would be a rounding error
-ITERATIONS = 80
+TINY = float(np.finfo(np.float64).tiny)  # smallest normal number; smaller displacements are set to 0
 
-# Indices of the `sums` of a sweep
-DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
-SUMS = 7
+# Indices of the `sums` of a sweep, and the number of these sums
+DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE, SUMS = range(8)
 
 
 class Blocks(NamedTuple):
@@ -36,28 +34,11 @@ class Blocks(NamedTuple):
     stretch: FloatArray
 
 
-@jit_inline
-def _four(column: FloatArray, i: int) -> float:
-    """Return the sum of the entries i, i + 1, i + half and i + half + 1 of a column, where half is BLOCK // 2."""
-    half = BLOCK // 2
-    here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
-    return float(here + (after + column[np.uintp(i + 1 + half)]))
-
-
-@jit
 def blocks_of(cells: Cells) -> Blocks:
     """Return the complete blocks of a line. The cells that remain at the end of the line belong to no block."""
-    blocks = (cells.mean.size - 1) // BLOCK
-    peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
-    for block in range(blocks):
-        i = block * BLOCK
-        highest = cells.peak[i]
-        for k in range(i, i + BLOCK):
-            highest = max(highest, cells.peak[np.uintp(k)])
-        peak[block] = highest
-        for column, whole in ((cells.mean, mean), (cells.stretch, stretch)):
-            whole[block] = (_four(column, i) + _four(column, i + 2)) + (_four(column, i + 4) + _four(column, i + 6))
-    return Blocks(peak, mean, stretch)
+    whole = (cells.mean.size - 1) // BLOCK * BLOCK
+    peak, mean, stretch = (each[:whole].reshape(-1, BLOCK) for each in (cells.peak, cells.mean, cells.stretch))
+    return Blocks(peak.max(axis=1), mean.sum(axis=1), stretch.sum(axis=1))
 
 
 class Barriers(NamedTuple):
@@ -73,7 +54,6 @@ class Barriers(NamedTuple):
     idle: FloatArray
 
 
-@jit
 def barriers_for(cells: int) -> Barriers:
     """Return empty arrays for the barriers of a line with the given number of cells."""
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
@@ -143,7 +123,7 @@ def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: 
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
     """Return the root of a cubic that decreases between `low` and `high`."""
     x = low + (high - low) * 0.5
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         force = p + x * (q + x * (r + x * c))
         if force > 0:
             low = x
@@ -182,7 +162,7 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
         return low
     first, end, x = low, high, high
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         free = u - u * _decayed((x - start) / deborah)
         gap = w0 + x * (a + x * (b + x * c)) - free
         if gap > 0:
@@ -381,10 +361,6 @@ def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the positions where the contact patches begin, and the positions where the patches end."""
-    n = cells.mean.size - 1
-    places = np.empty((2, n // 8 + 2))
+    places = np.empty((2, 2 * cells.mean.size + 1))  # contact ends at most twice in a cell, and at the end of the line
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)
-    if count > places.shape[1]:
-        places = np.empty((2, count))
-        sweep_cells(cells, every, barriers, deborah, depth, sums, places)
     return places[0, :count], places[1, :count]

@@ -26,6 +26,7 @@ from mdr_dask.physics.jit import jit, jit_inline, jit_inline_fused, jit_uncounte
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.cases import Cases, first_depths
+from mdr_dask.physics.sliding.kelvin import TINY
 from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import series
@@ -33,7 +34,6 @@ from mdr_dask.physics.surfaces.waves import series
 BLOCK = 32  # number of cells in a block
 WING = 4  # number of nodes on each side of a cell from which the finer nodes in the cell are interpolated
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes that `refine` needs before and after the period
-SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
 # Columns of `Nodes.blocks`. PEAK is an upper bound of the height. LOWEST and STEEPEST are the smallest height and the
 # smallest slope at the nodes.
@@ -41,8 +41,8 @@ SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highes
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 # Rows of a tile (a part of a line on a finer grid). HEIGHT and SLOPE begin at the node before the tile.
 # MEAN and SQUARE are the integrals of the height and of the squared slope over each cell. TOP is its largest height.
-HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
-IN_A_TILE = 5
+# IN_A_TILE is the number of rows.
+HEIGHT, SLOPE, MEAN, SQUARE, TOP, IN_A_TILE = range(6)
 
 
 class Nodes(NamedTuple):
@@ -81,16 +81,19 @@ def _ends_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
 def nodes(line: RoughLine, first: int, stride: int) -> Nodes:
     """Return every `stride`-th node of a line with two nodes per Nyquist point, beginning at node `first`.
 
-    If `stride` > 2 (less than one node per Nyquist point), the slopes are computed from differences of the heights.
+    If `stride` is 1, the highest point must be in the cell before node `first`. If `stride` > 2 (less than one node per
+    Nyquist point), the slopes are computed from differences of the heights.
     """
     height, slope = line.nodes
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
     ends = np.empty((2, h.size if stride == 1 else 0))
     corrections = _ends_of(line) if stride == 1 else (ends[0], ends[1])
-    taken = Nodes(h, s, ends, np.empty((n // BLOCK, 5)), float(height[first]), 0.0)
+    taken, rise = Nodes(h, s, ends, np.empty((n // BLOCK, 5)), float(height[first]), 0.0), np.zeros(1)
     _write_nodes(height, slope, corrections, first, stride, taken)
-    return taken
+    if stride == 1:
+        _peaks(h[BEFORE - 2 :], s[BEFORE - 2 :], 1, rise)
+    return taken._replace(rise=float(rise[0]))
 
 
 @jit
@@ -251,35 +254,23 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
             height[place], slope[place] = value, rate / refinement
 
 
-def with_summit(line: Nodes) -> Nodes:
-    """Return the line with the computed `rise`. The highest point must be in the cell before the first node."""
-    table = weights(SUMMIT)
-    height, slope = np.empty((2, SUMMIT + 3))
-    refine(line, BEFORE - 1, 1, table, height, slope)
-    return line._replace(rise=max(float(np.max(height[1:-1])), 0.0))
-
-
-LANES = 64  # number of cases that are computed together
-SMALL, LARGE = 1e-300, 1e12  # SMALL prevents division by zero; LARGE is the largest value of 1 / De
-CLOSED = 1e-9  # in a converged case, largest relative change of the displacement over one period
-RESOLVED = 10  # a grid is fine enough only if at least this number of cells is in contact
-
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
+LANES = 64  # number of cases that are computed together
+RESOLVED = 10  # a grid is fine enough only if at least this number of cells is in contact
+
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
-ROWS = 15
 # Offset of each quantity of a case in the workspace of a sweep.
 # State: displacement (U), derivative of U with respect to the depth (FADE), and CONTACT (1 in contact, 0 if free).
 # Sums: load, stiffness (RATE), drag (LOSS), length in contact, and integral of the squared slope in contact (STRETCH).
 # Constants: depth, De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and U at the start of the period (BEGAN).
-# CALM is 1 if the current block is entirely in contact or entirely free.
+# CALM is 1 if the current block is entirely in contact or entirely free. SIZE is the size of the workspace.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
-DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
-# Indices of the results of a case that are extrapolated over the last step of the depth
-DRAG, FRACTION, CONTACT_SLOPE = range(3)
-SECANTS = 3
+DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM, SIZE = range(8 * LANES, 16 * LANES, LANES)
+# Indices of the results of a case that are extrapolated over the last step of the depth, and the number of them
+DRAG, FRACTION, CONTACT_SLOPE, SECANTS = range(4)
 
 
 @jit_inline_fused
@@ -355,8 +346,8 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
     at the start of the cell and at `last`. One Newton step improves this guess.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
-    bow = (gap - closing * last - gap_last) / (last * last + SMALL)
-    steep = math.sqrt(abs(closing * closing + 4 * gap * bow)) + SMALL
+    bow = (gap - closing * last - gap_last) / (last * last + TINY)
+    steep = math.sqrt(abs(closing * closing + 4 * gap * bow)) + TINY
     root = 2 * gap / (closing + steep)
     root = root if root > 0 else 0.0
     root = root if root < last else last
@@ -481,7 +472,7 @@ def _pass_block(
         passed_load = load + u * memory if is_free else load
         free_rate = rate + fade * memory if is_free else rate
         free_loss = loss + 0.5 * u * u * lost * (1 + through) if is_free else loss
-        kept = kept if kept > SMALL else 0.0
+        kept = kept if kept > TINY else 0.0
         free_load, faded = kept if is_free else u, fade * through if is_free else fade
         workspace[LOAD + k] = load + (heights + cells * d) if is_pressed else passed_load
         workspace[RATE + k] = rate + cells if is_pressed else free_rate
@@ -545,7 +536,7 @@ def sweep(
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write the constants of case k to the workspace. The argument `cells` is the number of cells in a block."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
-    workspace[INVERSE + k] = min(1 / deborah, LARGE)
+    workspace[INVERSE + k] = 1 / deborah
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
 
 
@@ -562,7 +553,7 @@ def _search(
     """Find the depths of cases on a grid by Newton's method, and extrapolate the results over the last Newton step.
 
     The search ends if the last Newton step changes the depth and the extrapolated drag by at most the fraction
-    `accuracy`, and the displacement is periodic (see `CLOSED`). `depths` contains guesses of the penetration of the
+    `accuracy`, and the displacement is periodic to this accuracy. `depths` contains guesses of the penetration of the
     summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the derivatives of the
     logarithms of the results with respect to the depth, or NaN if unknown, and is updated. `results`, shape (cases,
     SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth is found.
@@ -570,7 +561,7 @@ def _search(
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    tile, workspace = np.empty((IN_A_TILE, cells + 3)), np.empty(ROWS * LANES)
+    tile, workspace = np.empty((IN_A_TILE, cells + 3)), np.empty(SIZE)
     queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
     step_before, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
     for begin in range(0, loads.size, LANES):
@@ -598,7 +589,7 @@ def _search(
                     rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
                     if depth + step == depth and not math.isfinite(rate[j]):
                         rate[j] = 0.0
-                closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
+                closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= accuracy * workspace[U + k]
                 if size <= accuracy and abs(rate[DRAG] * step) <= accuracy and closes:
                     depths[case] = depth + step
                     for j in range(SECANTS):
@@ -633,7 +624,7 @@ class NodeToNode:
             return self._start()
         if level == 2:
             cell, _ = highest_point(*self._rough.nodes)
-            self._line = with_summit(nodes(self._rough, (cell + 1) % (2 * self._rough.points), 1))
+            self._line = nodes(self._rough, (cell + 1) % (2 * self._rough.points), 1)
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
         depths = np.where(depths > 0, depths, first_depths(some.loads))
@@ -644,11 +635,11 @@ class NodeToNode:
     def _start(self) -> Solution:
         """Solve all cases on finer and finer grids, and return the solution with one node per Nyquist point."""
         height, loads = self._rough.nodes[0], self._cases.loads
+        depths, results = first_depths(loads), np.empty((loads.size, SECANTS))
+        highest = int(np.argmax(height))
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
             strides.append(strides[-1] * COARSENING)
-        depths, results = first_depths(loads), np.empty((loads.size, SECANTS))
-        highest = int(np.argmax(height))
         for stride in reversed(strides):
             results.fill(np.nan)
             line = nodes(self._rough, highest, stride)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import MOST_ITERATIONS
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
 from mdr_dask.physics.sliding.kelvin import (
@@ -32,13 +33,9 @@ from mdr_dask.physics.sliding.kelvin import (
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
-ITERATIONS = 200
-PATIENCE = 20  # after this number of sweeps, the search continues by bisection
-LOST = 1e-13  # a rise of the line below this fraction of the heights is lost to rounding (see `_is_lost`)
-# A trail describes the depth as a function of the load near the last sweep.
-# Entries of a trail: log depth, log load, slope d(log depth) / d(log load), d(slope) / d(log load), Deborah number.
-TRAIL = 5
-# a lattice depth is a depth with this number of significant binary digits; the search tries lattice depths only
+LOST = 1e-13  # a smaller rise, relative to the heights, has rounding errors above 0.2 % (see `_is_lost`)
+# A lattice depth is a depth with this number of significant binary digits. The search tries lattice depths only. The
+# relative errors of contact fraction and contact slope are then about 2^-20, below every accuracy that a user needs.
 LATTICE_BITS = 20
 
 
@@ -56,32 +53,6 @@ def _next(depth: float) -> float:
     return math.ldexp(math.ldexp(mantissa, LATTICE_BITS) + 1, exponent - LATTICE_BITS)
 
 
-@jit
-def _begin(trail: FloatArray, depth: float, load: float) -> None:
-    """Start a `trail` (see `TRAIL`) from a guess of the depth for a load."""
-    trail[0], trail[1], trail[2], trail[3], trail[4] = math.log(depth), math.log(load), 0.7, 0.0, 0.0
-
-
-@jit
-def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Update a `trail` (see `TRAIL`) after a sweep at a depth."""
-    carried = sums[DISPLACEMENT]
-    load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
-    change = load - trail[1]
-    # a change of the Deborah number hardly changes the derivative of the slope
-    bend = (slope - trail[2]) / change if deborah == trail[4] and abs(change) > 1e-12 else trail[3]
-    trail[0], trail[1], trail[2], trail[3], trail[4] = np.log(depth), load, slope, bend, deborah
-
-
-@jit
-def _guess(trail: FloatArray, load: float) -> float:
-    """Return a guess of the depth for a load by extrapolation of the logarithm of the depth from the `trail`."""
-    ahead = np.log(load) - trail[1]
-    bend = 0.5 * trail[3] * ahead
-    limit = 0.5 * trail[2]
-    return math.exp(trail[0] + ahead * (trail[2] + min(max(bend, -limit), limit)))
-
-
 class _Swept(NamedTuple):
     """Cells and blocks of a line, barriers at one Deborah number, and mean height relative to the highest point."""
 
@@ -93,48 +64,42 @@ class _Swept(NamedTuple):
 
 @jit
 def _solve(
-    line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: FloatArray
+    line: _Swept, deborah: float, load: float, guess: float, sums: FloatArray, places: FloatArray
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
-    The depth cannot exceed the depth in full contact. The carried load is a convex, increasing function of the depth.
-    The depth therefore cannot exceed the depth at which any tangent to this function reaches `load`. The result does
-    not depend on the guess in `trail`. `sums` receives the sums at the returned depth.
+    The carried load is a convex, increasing function of the depth. Newton's method therefore approaches the depth from
+    above. The depth cannot exceed the depth in full contact. The result does not depend on the guess. `sums` receives
+    the sums at the returned depth.
     """
     cells, blocks, barriers, mean = line
-    low, high = 0.0, np.inf
-    most = load / (cells.mean.size - 1) - mean
-    depth = _floor(min(_guess(trail, load), most))
-    best = np.zeros(SUMS)
-    for iteration in range(ITERATIONS):
+    most, high = load / (cells.mean.size - 1) - mean, np.inf
+    depth = _floor(min(guess, most))
+    for _ in range(MOST_ITERATIONS):
         sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
         carried = sums[DISPLACEMENT]
-        if not (carried > 0 and sums[STIFFNESS] > 0):
+        tangent = min(depth + (load - carried) / sums[STIFFNESS], most)
+        if not (carried > 0 and tangent > 0):
             return depth, False
-        tangent = depth + (load - carried) / sums[STIFFNESS]
-        if tangent > low:  # if the sums overflow, the tangent is not finite
-            most = min(most, tangent)
-        _follow(sums, depth, deborah, trail)
-        if carried <= load:
-            low = depth
-            best[:] = sums
-            if tangent < _next(depth):  # the next lattice depth carries more than `load`
-                return depth, True
-        else:
+        if carried > load:
             high = depth
-        if low > 0 and _next(low) >= high:
-            sums[:] = best
-            return low, True
-        proposal = min(_guess(trail, load), most)
-        if iteration > PATIENCE and high < np.inf:
-            proposal = 0.5 * (low + high)
-        depth = _floor(proposal)
-        if depth <= low:
-            depth = _next(low)
-        elif depth >= high:
-            depth = _floor(0.5 * (low + high)) if high - low > 2 * (_next(low) - low) else low
-            depth = max(depth, _next(low)) if low > 0 else _floor(0.5 * high)
+            depth = _floor(min(tangent, np.nextafter(depth, 0.0)))
+            continue
+        above = _next(depth)
+        if tangent < above or above >= high:  # the next lattice depth carries more than `load`
+            return depth, True
+        depth = _floor(tangent) if _floor(tangent) < high else above
     return depth, False
+
+
+@jit
+def _guess(known: tuple[float, float, float], load: float) -> float:
+    """Return a guess of the depth for a load from a known case: depth, load and d(load)/d(depth).
+
+    Near the known case, the depth is approximately a power of the load.
+    """
+    depth, carried, stiffness = known
+    return float(depth * (load / carried) ** (carried / (stiffness * depth)))
 
 
 @jit
@@ -142,37 +107,34 @@ def _states(
     line: _Swept,
     cases: Cases,
     guesses: FloatArray,
-    first: FloatArray,
+    first: tuple[float, float, float],
     results: FloatArray,
     status: NDArray[np.int8],
-) -> None:
+) -> tuple[float, float, float]:
     """Solve cases on one line at one Deborah number. The loads of the cases must be ascending.
 
     `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the entry of the case in
-    `guesses`, or from the trail of the previous case if this entry is NaN. For the first case, the trail in `first`
-    replaces the trail of the previous case. Afterwards, `first` contains the trail of the first case that was solved.
+    `guesses`. If this entry is NaN, the search starts from the `_guess` from the previous case, or from `first` for the
+    first case. Return depth, load and d(load)/d(depth) of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))
-    sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
-    trail[:] = first
+    sums, last, starts = np.empty(SUMS), first, True
     for k in range(loads.size):
-        if guesses[k] > 0:
-            _begin(trail, guesses[k], loads[k])
-        depth, is_found = _solve(line, deborahs[k], loads[k], trail, sums, places)
+        guess = guesses[k] if guesses[k] > 0 else _guess(last, loads[k])
+        depth, is_found = _solve(line, deborahs[k], loads[k], guess, sums, places)
         if not is_found:
             status[k] = Outcome.DEPTH_NOT_FOUND
-            trail[:] = first
             continue
-        if starts:
-            first[:] = trail
-            starts = False
+        last = depth, sums[DISPLACEMENT], sums[STIFFNESS]
+        first, starts = last if starts else first, False
         shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = Outcome.OUTSIDE_LINE if sums[OUTSIDE] > 0 else Outcome.CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
         results[k, 1] = depth + shift
         results[k, 2] = sums[LENGTH] / n
         results[k, 3] = n * np.sqrt(sums[STRETCH] / sums[LENGTH]) if sums[LENGTH] > 0 else 0.0
+    return first
 
 
 def steady_sliding(
@@ -264,15 +226,15 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
     """
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
-    deborah, loads, starts, first = cases.deborah[order], cases.loads[order], guesses[order], np.zeros(TRAIL)
+    deborah, loads, starts = cases.deborah[order], cases.loads[order], guesses[order]
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
-    _begin(first, loads[0] / n - mean, loads[0])
+    first = float(loads[0] / n - mean), float(loads[0]), float(n)  # of full contact
     barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         barriers.block.fill(np.nan)  # barriers are valid for one Deborah number only
         line, alike = _Swept(cells, blocks, barriers, mean), Cases(deborah[some], loads[some])
-        _states(line, alike, starts[some], first, ordered[some], ordered_status[some])
+        first = _states(line, alike, starts[some], first, ordered[some], ordered_status[some])
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     highest = int(np.argmax(cells.peak[:-1]))

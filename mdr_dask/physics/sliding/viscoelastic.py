@@ -14,7 +14,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.refine import Solution
+from mdr_dask.physics.refine import CLOSE, EPS, MOST_ITERATIONS, Solution
 from mdr_dask.physics.sliding.viscoelastic_sweep import (
     Passage,
     Travelling,
@@ -24,12 +24,6 @@ from mdr_dask.physics.sliding.viscoelastic_sweep import (
 )
 from mdr_dask.physics.solids import LinearSolid, recovery_times
 
-TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
-LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step
-SWEEPS = 80
-DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one Newton step
-SHORTEST = 1e-9  # in cell widths; dashpot and all Prony terms with smaller tau_m v become one term: see `travelling`
-BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
 ORDER = 2.0  # order of convergence without extrapolation; with extrapolation, higher if many cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
@@ -56,9 +50,8 @@ class ViscoelasticCase:
         summit = float(np.max(height))
         below, load = np.ascontiguousarray(height - summit), self._load * cells
         solid = travelling(self._solid, 1 / cells)
-        outcome, values = Outcome.DEPTH_NOT_FOUND, np.full(4, np.nan)
         for start in [None] if self._state is None else [self._state, None]:
-            outcome, state, values = self._solve(below, load, solid, periodic, start)
+            outcome, state, values, imbalance = self._solve(below, load, solid, periodic, start)
             if outcome != Outcome.DEPTH_NOT_FOUND:
                 break
         self._state = state if outcome == Outcome.CONVERGED else None
@@ -72,12 +65,12 @@ class ViscoelasticCase:
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
         self._before = values
-        return Solution(list(result[:, None]), np.array([outcome], np.int8))
+        return Solution(list(result[:, None]), np.array([outcome], np.int8), imbalance)
 
     def _solve(
         self, below: FloatArray, load: float, solid: Travelling, periodic: bool, start: FloatArray | None
-    ) -> tuple[Outcome, FloatArray, FloatArray]:
-        """Return the outcome, the state and the four results on one grid.
+    ) -> tuple[Outcome, FloatArray, FloatArray, float]:
+        """Return the outcome, the state, the four results, and the relative error of the carried load on one grid.
 
         The state contains the stretches at the first node and the depth. The depth is the penetration of the highest
         node. The search starts from `start`, the state on the previous grid. If `start` is None or has another number
@@ -90,28 +83,26 @@ class ViscoelasticCase:
             start = np.append(np.full(terms, depth - load / inner.size), depth)
         unknown, totals = start.copy(), np.empty(6)
         outcome = Outcome(solve_sliding(below, load, periodic, solid, unknown, totals))
-        is_balanced = abs(float(totals[1]) / load - 1) < BALANCE and unknown[-1] > 0
-        if outcome == Outcome.CONVERGED and not is_balanced:
+        if outcome == Outcome.CONVERGED and not unknown[-1] > 0:
             outcome = Outcome.DEPTH_NOT_FOUND
         slope = cells * np.sqrt(totals[4] / totals[3]) if totals[3] > 0 else 0.0
         values = np.array([totals[2], unknown[-1], totals[3] / cells, slope])
-        return outcome, unknown, values
+        return outcome, unknown, values, abs(float(totals[1]) / load - 1)
 
 
 def travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths divided by the cell width and stresses divided by the static modulus.
 
-    The dashpot, and all Prony terms that relax within a very small fraction of a cell, are replaced by one Prony term
-    with a very short relaxation time and the same viscosity.
+    The dashpot, and all Prony terms that relax within the fraction `CLOSE` of a cell, are replaced by one Prony term
+    that relaxes within this fraction and has the same viscosity.
     """
     static = solid.static_modulus
-    fast = solid.times < SHORTEST * cell
+    fast = solid.times <= CLOSE * cell
     moduli, deborah = solid.moduli[~fast] / static, solid.times[~fast] / cell
     viscosity = (solid.viscosity + solid.moduli[fast] @ solid.times[fast]) / static
     if viscosity > 0:
-        shortest = SHORTEST / 10
-        moduli = np.append(viscosity / cell / shortest, moduli)
-        deborah = np.append(shortest, deborah)
+        moduli = np.append(viscosity / cell / CLOSE, moduli)
+        deborah = np.append(CLOSE, deborah)
     times, distance = recovery_times(moduli * deborah, deborah)
     stretch = deborah[:, None] / distance  # row m, column k: stretch of Prony term m in recovery mode k of strain 1
     # the modes are orthogonal with the weights moduli / deborah, so that the inverse of `stretch` has a closed form
@@ -202,7 +193,7 @@ def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
     residual /= scale
     step[:] = 0.0
-    wanted = LINEAR * LINEAR * _dot(residual, residual)
+    wanted = CLOSE * CLOSE * _dot(residual, residual)
     for j in range(n):
         if not _dot(residual, residual) > wanted:  # the residual is small enough, or not finite
             break
@@ -263,12 +254,15 @@ def solve_sliding(
     steepest = 0.0
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
-    rounding = 1e-15 * nodes * steepest  # error of a height due to the rounding error of a position
-    for _ in range(SWEEPS):
+    rounding = EPS * nodes * steepest  # error of a height due to the rounding error of a position
+    is_last = False
+    for _ in range(MOST_ITERATIONS):
         for i in range(nodes):
             penetration[i] = unknown[terms] + profile[i]
         start = unknown[:terms]
         pieces, ends_in_contact = sweep_line(penetration, start, solid, not periodic, passage, of_sweep)
+        if is_last:
+            return Outcome.CONVERGED if periodic or not ends_in_contact else Outcome.OUTSIDE_LINE
         found = passage.lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:
@@ -282,7 +276,7 @@ def solve_sliding(
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
             # use the integral of the stress as the load, because the integral of u beyond the line may be unknown
-            step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
+            step[terms] = max((strain_area - totals[1]) / product[terms], -0.5 * unknown[terms])
         largest = 0.0
         for j in range(size):
             # an error of the stretch of a soft Prony term hardly matters
@@ -291,6 +285,5 @@ def solve_sliding(
             unknown[j] += step[j]
         if not np.isfinite(largest):
             break
-        if largest <= TOLERANCE * unknown[terms] + rounding:
-            return Outcome.CONVERGED if periodic or not ends_in_contact else Outcome.OUTSIDE_LINE
+        is_last = largest <= CLOSE * unknown[terms] + rounding
     return Outcome.DEPTH_NOT_FOUND

@@ -14,6 +14,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 
 
 class Travelling(NamedTuple):
@@ -51,7 +52,7 @@ def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: Fl
     """
     for m in range(deborah.size):
         x = length / deborah[m]
-        if x < 0.02:
+        if x < 0.02:  # the closed form of `area` would lose digits, the series is exact to rounding
             loss = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6)))))
             decay[m] = 1 - loss
             gain[m] = deborah[m] * loss
@@ -82,7 +83,7 @@ def separation_point(
     """Return the place between 0 and `end` where the stress falls to zero, by Newton's method and bisection."""
     low, high = 0.0, end
     point = min(0.5 * end, deborah[0]) if deborah.size else 0.5 * end  # deborah[0] is the shortest decay length
-    for _ in range(200):
+    for _ in range(MOST_ITERATIONS):
         pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, deborah)
         if pressure > 0:
             low = point
@@ -91,7 +92,7 @@ def separation_point(
         following = point - pressure / rate if rate < 0 else -1.0
         if not low < following < high:
             following = 0.5 * (low + high)
-        if abs(following - point) <= 1e-15 * point or high - low <= 1e-15 * high:
+        if abs(following - point) <= CLOSE * point:
             return following
         point = following
     return point
@@ -115,7 +116,7 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
     Newton's method converges from `low` without overshooting, because the strain of a free element is convex in t.
     """
     point = low
-    for _ in range(60):
+    for _ in range(MOST_ITERATIONS):
         strain, rate = _strain_of(point, modes, times)
         gap, rate = strain - (start + slope * (point - low)), rate - slope
         if gap <= 0 or rate >= 0:
@@ -124,7 +125,7 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
         point += step
         if point >= high:
             return high
-        if step <= 1e-15 * high:
+        if step <= CLOSE * high:
             return point
     return point
 
