@@ -74,7 +74,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def dated(rows: Iterable[Row], text: str) -> str:
-    """Return a text below the dates of the rows."""
+    """Return a text with the dates of the rows above it."""
     return f"Measured on {' and '.join(sorted({row.measured for row in rows}))}.\n\n{text}"
 
 

@@ -25,7 +25,7 @@ def ours(groups, pieces):
 
 
 def by_gaussian_processes(groups, pieces, noise):
-    """Return factors and half widths by mastercurves, in natural logarithms and within two decades as in its manual."""
+    """Return factors and half widths by mastercurves, used as in its manual: natural logarithms, within two decades."""
     from mastercurves import MasterCurve
     from mastercurves.transforms import Multiply
 
@@ -68,7 +68,7 @@ def ways():
 
 def compared() -> Iterator[Row]:
     """Yield, for each shape and method, median time, error and half width, and the share of factors in the interval."""
-    warnings.simplefilter("ignore")  # on Gaussian processes at a bound, and on attributes in pandas
+    warnings.simplefilter("ignore")  # warnings of Gaussian processes about a bound, and of pandas about attributes
     methods = ways()
     for shape in CASES:
         judged = {name: [] for name in methods}

@@ -147,7 +147,7 @@ def of_a_polymer(number: int, random: np.random.Generator, channels: slice = sli
 
 
 def drawn(kind, *choices):
-    """Return a function that draws a family of a kind with a random one of these choices."""
+    """Return a function that draws a family: it calls `kind` with one of the choices, taken at random."""
 
     def draw(random: np.random.Generator) -> tuple[Family, Truth]:
         family = kind(choices[random.integers(len(choices))], random)

@@ -32,7 +32,7 @@ LINES = 40
 def response(points, deborah):
     """Return the displacement response to forces for unit modulus E* = 4 G, in the frame of the punch.
 
-    For a Kelvin half-space u + v tau du/dx = u_el, where u_el is the displacement of the elastic half-space.
+    For a Kelvin half-space u + v tau du/dx = u_el, where u_el is the displacement of an elastic half-space.
     """
     q_x, _ = wavenumbers((2 * points, 2 * points), (2.0, 2.0))
     return free_half_space(points).response / (1 + 1j * deborah * q_x)[:, None]
