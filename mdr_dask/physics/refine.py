@@ -28,13 +28,13 @@ SAFETY = 3.0
 """Roache's safety factor for an estimate from two grids."""
 
 MOST_ITERATIONS = 100
-"""Limit of a search for a root. Fewer bisections reach the accuracy of floating-point numbers."""
+"""Largest number of steps in a search for a root. Fewer bisections reach the accuracy of floating-point numbers."""
 
 EPS = float(np.finfo(np.float64).eps)
 """Relative rounding error of floating-point numbers."""
 
 CLOSE = float(np.sqrt(EPS))
-"""Newton's method ends after a relative step below this limit. The next step, about the square, would be rounding."""
+"""Newton's method ends after a relative step below this limit. The next step, about its square, would be rounding."""
 
 
 class Estimate(NamedTuple):
@@ -147,7 +147,7 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
     The largest change along a profile is divided by the largest absolute value of the profile, or by the floor of the
-    output if the floor is larger. The change is infinite if a case has no solution on either grid or on both grids.
+    output if the floor is larger. The change is infinite unless the case has a solution on both grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))

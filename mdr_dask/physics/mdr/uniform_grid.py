@@ -107,8 +107,8 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`.
 
-    For r = low = 0, the integral diverges, and 2 is returned. If the slope of the line load is proportional to x, the
-    integral of slope / x over the first cell is 2 times the mean slope in this cell.
+    For r = low = 0, the integral diverges, and 2 is returned instead: if the slope of the line load is proportional to
+    x, the integral of slope / x over the first cell is 2 times the mean slope in this cell.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

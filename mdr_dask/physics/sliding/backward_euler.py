@@ -1,8 +1,8 @@
-"""Steady states of a Kelvin foundation in many cases on one line, by backward Euler as in the papers.
+"""Steady states of a Kelvin foundation in many cases on one line, by backward Euler as in the thesis.
 
 The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height. The decay per
 time step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two
-nodes. As u is periodic, the forces are sums over the nodes:
+nodes. The forces are sums over the nodes:
 
     F_N / (4 G dx) = sum of u_i
     F_x / (4 G) = sum of (w_i - w_(i-1)) (u_i - lambda u_(i-1)) / (1 - lambda)
@@ -29,12 +29,12 @@ LANES = 8  # number of cases in one vector instruction
 
 # Rows of `Lanes.sums`, and the number of these rows
 CARRIED, STIFFNESS, DRAG, SUMS = range(4)
-# Columns of `Nodal.blocks`. STEEPEST is the smallest rise, and BEFORE is the height of the node before the block.
+# Columns of `Nodal.blocks`. STEEPEST is the smallest (most negative) rise. BEFORE is the height before the block.
 # HEIGHTS, RISES, WORK and SQUARES are the sums of height, rise, height times rise, and rise squared over the block.
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
-# Rows of `Lanes.state`: displacement u (U), and the derivative of u with respect to the depth (FADE).
-# THROUGH is the decay factor of u over a free block. MEMORY is the sum of the decay factors at the nodes of the block.
-# LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block. ROWS is the number of rows.
+# Rows of `Lanes.state`, and the number ROWS of these rows. U is the displacement u, and FADE is du/d(depth). THROUGH is
+# the decay factor of u over a free block. MEMORY is the sum of u over a free block if u is 1 just before the block.
+# LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block.
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS, ROWS = range(8)
 
 

@@ -17,7 +17,7 @@ COARSENING = 8
 """Ratio of the numbers of nodes of successive grids in `strides`, chosen by trial: 4 to 16 take about the same time."""
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
-"""Names of the results of a case, in the order of the rows of an array of results."""
+"""Names of the results of a case, in the order of the rows of `Steady.columns`."""
 
 
 class Cases(NamedTuple):

@@ -251,10 +251,10 @@ def sweep_cells(
     """Move one element once along the line, and return the number of contact patches.
 
     Limits in `barriers` that are still NaN are computed when they are needed. `sums` receives, in this order: the
-    integral of u, f = F_N / (4 G dx); df/d(depth); g = F_x / (4 G); dg/d(depth); the length in contact; the integral of
-    w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
-    `places`, shape (2, capacity), receives the positions where the first `capacity` patches begin and end. Further
-    patches are only counted.
+    load f = F_N / (4 G dx), which is the integral of u; df/d(depth); the drag g = F_x / (4 G); dg/d(depth); the length
+    in contact; the integral of w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in
+    contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the first `capacity` patches begin
+    and end. Further patches are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (

@@ -43,7 +43,7 @@ def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
 
     The arguments are `force_number`, `velocity_number`, and the constants alpha and beta of eq. 3.11. Three laws are
     combined by 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 = sqrt(2) slope is the plateau, mu_2 follows
-    from `full_contact`, and mu_3 = sqrt(2) slope beta velocity force^-alpha is the law at low velocity and low force.
+    from `full_contact`, and mu_3 = mu_1 * beta * velocity / force^alpha is the law at low velocity and low force.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 

@@ -35,13 +35,13 @@ BLOCK = 32  # number of cells in a block
 WING = 4  # number of nodes on each side of a cell from which the finer nodes in the cell are interpolated
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes that `refine` needs before and after the period
 
-# Columns of `Nodes.blocks`. PEAK is an upper bound of the height. LOWEST and STEEPEST are the smallest height and the
-# smallest slope at the nodes.
+# Columns of `Nodes.blocks`. PEAK is an upper bound of the height. LOWEST is the smallest height at the
+# nodes. STEEPEST is the steepest descent (the smallest slope) at the nodes.
 # HEIGHTS and SQUARES are the integrals of the height and of the squared slope over a block.
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 # Rows of a tile (a part of a line on a finer grid). HEIGHT and SLOPE begin at the node before the tile.
-# MEAN and SQUARE are the integrals of the height and of the squared slope over each cell. TOP is its largest height.
-# IN_A_TILE is the number of rows.
+# MEAN and SQUARE are the integrals of the height and of the squared slope over each cell. TOP is the largest height
+# in each cell. IN_A_TILE is the number of rows.
 HEIGHT, SLOPE, MEAN, SQUARE, TOP, IN_A_TILE = range(6)
 
 
@@ -137,7 +137,7 @@ def _write_nodes(
 
 @jit
 def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatArray) -> None:
-    """Write every `stride`-th value of a period that begins at `first`, with `BEFORE` and `AFTER` further nodes."""
+    """Write every `stride`-th value of the period from `first` on, and `BEFORE` values before and `AFTER` after it."""
     n, place = written.size - BEFORE - AFTER, first
     for i in range(BEFORE, BEFORE + n):
         written[i] = values[place]
@@ -269,7 +269,7 @@ ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly 
 # CALM is 1 if the current block is entirely in contact or entirely free. SIZE is the size of the workspace.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM, SIZE = range(8 * LANES, 16 * LANES, LANES)
-# Indices of the results of a case that are extrapolated over the last step of the depth, and the number of them
+# Indices of the results of a case that are extrapolated over the last step of the depth, and their number
 DRAG, FRACTION, CONTACT_SLOPE, SECANTS = range(4)
 
 

@@ -54,7 +54,7 @@ class Request:
 
     `accuracy` is the allowed relative error (for small results see `FLOORS`). `oversampling` is the number of nodes per
     Nyquist point, or "auto" for the smallest number of nodes that meets the accuracy. The scheme for a Kelvin solid is
-    "hermite" (cubic cells) or "backward_euler" (the time steps of the papers). If `with_errors` is False, the errors of
+    "hermite" (cubic cells) or "backward_euler" (the time steps of the thesis). If `with_errors` is False, the errors of
     a Kelvin solid on a given grid are not estimated. `contact` requests contact fraction and contact slope, which need
     finer grids than drag and depth.
     """
@@ -131,7 +131,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
     """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
-    # contact fraction and slope are computed at a rounded depth; two grids with the same rounded depth hide this error
+    # contact fraction and slope belong to a rounded depth; if two grids round alike, their difference hides this error
     unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:

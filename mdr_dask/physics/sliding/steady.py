@@ -94,9 +94,9 @@ def _solve(
 
 @jit
 def _guess(known: tuple[float, float, float], load: float) -> float:
-    """Return a guess of the depth for a load from a known case: depth, load and d(load)/d(depth).
+    """Return a guess of the depth for a load. `known` contains depth, load and d(load)/d(depth) of another state.
 
-    Near the known case, the depth is approximately a power of the load.
+    For similar loads, the depth is approximately a power of the load.
     """
     depth, carried, stiffness = known
     return float(depth * (load / carried) ** (carried / (stiffness * depth)))
@@ -114,8 +114,8 @@ def _states(
     """Solve cases on one line at one Deborah number. The loads of the cases must be ascending.
 
     `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the entry of the case in
-    `guesses`. If this entry is NaN, the search starts from the `_guess` from the previous case, or from `first` for the
-    first case. Return depth, load and d(load)/d(depth) of the first case that was solved.
+    `guesses`. If this entry is NaN, `_guess` computes the start from the previous case, or from `first` for the first
+    case. Return depth, load and d(load)/d(depth) of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))
@@ -192,7 +192,7 @@ def steady_on_cells(
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
-    """Return the steady states by backward Euler, the time-stepping method of the papers.
+    """Return the steady states by backward Euler, the time-stepping method of the thesis.
 
     See `steady_sliding` for the first three arguments. Only the heights of the nodes are used. In each time step the
     body travels one cell. The error is proportional to the cell width. Contact fraction and contact slope take extra
@@ -228,7 +228,7 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
     deborah, loads, starts = cases.deborah[order], cases.loads[order], guesses[order]
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
-    first = float(loads[0] / n - mean), float(loads[0]), float(n)  # of full contact
+    first = float(loads[0] / n - mean), float(loads[0]), float(n)  # for full contact
     barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):

@@ -104,7 +104,7 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
         moduli = np.append(viscosity / cell / CLOSE, moduli)
         deborah = np.append(CLOSE, deborah)
     times, distance = recovery_times(moduli * deborah, deborah)
-    stretch = deborah[:, None] / distance  # row m, column k: stretch of Prony term m in recovery mode k of strain 1
+    stretch = deborah[:, None] / distance  # row m, column k: stretch of Prony term m if recovery mode k has strain 1
     # the modes are orthogonal with the weights moduli / deborah, so that the inverse of `stretch` has a closed form
     norm = np.sum((moduli * deborah)[:, None] / distance**2, axis=0)
     return Travelling(moduli, deborah, times, stretch.T.copy(), moduli[:, None] / distance / norm)

@@ -3,10 +3,10 @@
 The search starts at the highest point of the line and visits the cells in the direction in which the elements move. The
 force on an element in contact is lift + h + D h'. Here h is the height of the line, the Deborah number D is the
 distance v tau in cells, and the lift is the sum of the depth and the rate of the depth. Contact ends where the force
-falls through zero. Contact also ends where the line is no longer in contact because the next elements, which are free,
-have a displacement larger than the depth plus the height of the line.
-Contact begins where the line rises above the free elements and the force would be positive. Most cells are skipped,
-because rigorous bounds show that contact neither begins nor ends there (`_skip_pressed`, `_skip_free`).
+falls through zero. Contact also ends where free elements arrive with a displacement that is larger than the depth plus
+the height of the line. Contact begins where the line rises above the free elements and the force would be positive.
+Most cells are skipped, because rigorous bounds show that contact neither begins nor ends there (`_skip_pressed`,
+`_skip_free`).
 
 Free elements may pass the highest point without contact and travel more than a whole period of the line. If the motion
 since the jump allows free elements to do so, the search is repeated with the elements that separated from the line in

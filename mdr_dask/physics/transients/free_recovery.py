@@ -27,7 +27,7 @@ from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Pa
 
 STRIDE = 2.0  # longest step towards a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
-# There are WINDOWS windows of time. In the shortest, the line travels WINDOW cells; each next window is twice as long.
+# There are WINDOWS windows of time. The line travels WINDOW cells in the shortest, and twice as far in each next one.
 WINDOW, WINDOWS = 8.0, 16
 
 
@@ -88,10 +88,10 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     left, back = np.exp(-time), last
     shallowest, deepest, least_lift = depth, depth, depth + rate
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
-    if first.deborah > deborah:  # drift of elements free since before the jump, when D was D_1: u (1 - D / D_1)
+    if first.deborah > deborah:  # drift u (1 - D / D_1) of elements free since before the jump
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes the part of this increase in the window, up to half a window after the jump.
+    # passed earlier. `opened` includes this increase from the start of a window until half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k

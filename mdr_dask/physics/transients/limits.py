@@ -57,7 +57,7 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, float]:
-        """Return patches and drag in steady sliding at a depth below the mean line and a Deborah number v tau / L."""
+        """Return patches and drag in steady sliding, given the penetration of the mean line and v tau / L."""
         depth, deborah, sums = depth + self.cells.top, deborah * self.track.cells, np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         return Patches(start, end, _pressed(self.track, end, depth), depth, deborah), float(sums[SWEEP_DRAG])
@@ -114,7 +114,7 @@ def steady_limits(
         before, after = (float(each) for each in deborah[k])
         first, drag = line.patches(float(depths[k, 0]), before)
         slower, drag_after, is_full = first, float(drags[k, 1]), False
-        if after < before or first.start.size == 1:  # free elements would be followed by a second patch
+        if after < before or first.start.size == 1:  # one patch: full contact (a period begins and ends in contact)
             last, drag_after = line.patches(float(depths[k, 1]), after)
             slower, is_full = last if after < before else first, first.start.size == last.start.size == 1
         fast = after * n

@@ -217,7 +217,7 @@ def _carrying_rate(
 
 
 DRAG, DEPTH, CONTACT = range(3)
-CORRECTIONS = 2  # number of times that the times of separation and the depth are corrected in a time step
+CORRECTIONS = 2  # number of corrections of the times of separation and of the depth in a time step
 
 
 class State(NamedTuple):
