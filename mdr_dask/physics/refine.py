@@ -34,7 +34,7 @@ EPS = float(np.finfo(np.float64).eps)
 """Relative rounding error of floating-point numbers."""
 
 CLOSE = float(np.sqrt(EPS))
-"""Newton's method ends after a relative step below this limit. The next step, about its square, would be rounding."""
+"""Newton's method ends after a relative step below this limit, because the next step would be a rounding error."""
 
 
 class Estimate(NamedTuple):

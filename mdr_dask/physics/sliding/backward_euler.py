@@ -41,7 +41,7 @@ U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS, ROWS = range(8)
 class Nodal(NamedTuple):
     """Heights of a line at the nodes, and the rise from the previous node to each node.
 
-    `blocks` contains the results of `_blocks`. A periodic line ends at the highest node.
+    Row j of `blocks` contains the quantities `PEAK` to `SQUARES` of block j. A periodic line ends at the highest node.
     """
 
     height: FloatArray
@@ -87,7 +87,7 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
 
 
 def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
-    """Return the columns `PEAK` to `SQUARES` of every block, shape (n // BLOCK, 8)."""
+    """Return `Nodal.blocks`, shape (n // BLOCK, 8)."""
     whole = height.size // BLOCK * BLOCK
     h, t = height[:whole].reshape(-1, BLOCK), rise[:whole].reshape(-1, BLOCK)
     before = np.roll(height, 1)[:whole:BLOCK]
@@ -233,7 +233,7 @@ def _newton(
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
             earlier = before[0, k] - depth[k]
-            if abs(step * earlier) <= CLOSE * depth[k] ** 2:  # about the error of the extrapolated drag
+            if abs(step * earlier) <= CLOSE * depth[k] ** 2:  # estimated relative error of the extrapolated drag
                 change = (before[1, k] - drag) / earlier * step if abs(earlier) > 0 else 0.0
                 depths[case] = depth[k] + step
                 drags[case] = drag + change

@@ -37,7 +37,7 @@ def first_depths(loads: FloatArray) -> FloatArray:
 
 
 def strides(nodes: int) -> list[int]:
-    """Return the strides of the grids, from coarse to fine, on which the depth is searched. The last stride is 1."""
+    """Return strides. The depth is searched on grids with every stride-th node, from coarse to fine (stride 1)."""
     found = [1]
     while nodes > COARSENING**2 * found[-1]:
         found.append(found[-1] * COARSENING)

@@ -78,7 +78,7 @@ def write_barriers(
             inside = first - x * (q + x * (r + x * c))
             highest = inside if inside > highest else highest
         written[i] = highest
-        # the largest Bernstein coefficient is an upper bound of the force
+        # the largest Bernstein coefficient is an upper bound of force - depth
         idle[i] = min(min(first, last), min(near, far))
         every = highest if highest > every else every
     barriers.block[block] = every

@@ -49,10 +49,10 @@ class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
     `height` is measured from the first node, which has the height `top` on the original line. `slope` is the rise per
-    cell. `ends` contains the results of `_ends_of` or is empty. The arrays `height`, `slope` and `ends` begin with the
-    last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. `rise` is the
-    height of the highest point above the first node. The highest point is in the cell before the first node. On coarse
-    grids, `rise` is 0.
+    cell. `ends` contains the corrections from `_ends_of`, or is empty. The arrays `height`, `slope` and `ends` begin
+    with the last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. `rise`
+    is the height of the highest point above the first node. The highest point is in the cell before the first node. On
+    coarse grids, `rise` is 0.
     """
 
     height: FloatArray

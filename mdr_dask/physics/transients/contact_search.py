@@ -60,7 +60,7 @@ from mdr_dask.physics.transients.patches import (
 
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
-VISITS = 6  # largest number of changes of contact in a cell, as a cubic force changes sign at most three times
+VISITS = 6  # largest number of patches that end in a cell; the three sign changes of a cubic force allow fewer
 LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch leaves a run of cells, or a work array is full
 
 # Entries of `Workspace.scan`, the state of the search
@@ -70,7 +70,7 @@ LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch leaves a run
     HELD,  # place up to which the current patch is certainly in contact
     FIRM_LIFT,  # a cell in contact can be skipped if the barrier of the cell is below this lift
     FIRM_UNTIL,  # place up to which `FIRM_LIFT` is valid
-    LOWEST,  # least displacement of free elements at the end of the previous cell
+    LOWEST,  # lower bound of the displacement of free elements at the end of the previous cell
 ) = range(6)
 
 
@@ -409,14 +409,14 @@ def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
 
 @jit_inline_uncounted
 def _lowest_beyond(search: Search, u: float) -> float:
-    """Return the least displacement of free elements one cell beyond a place, given the displacement u at the place."""
+    """Return a lower bound of the displacement of free elements one cell after a place with the displacement u."""
     now, drift = search.now, search.work.recovery.bounds.least_drift[WINDOWS - 1]
     return float((u - drift) * np.exp(-1 / min(now.deborah, now.first.deborah)) + drift)
 
 
 @jit_inline_uncounted
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
-    """Return True and the place where contact begins beyond x in a cell, or False and where to continue the search.
+    """Return True and the place where contact begins beyond x in a cell, or False and the place to search next.
 
     Contact can begin only between `low`, where the force becomes positive, and `high`, where the force falls to zero
     again. If contact does not begin, `high` is stored as a place of separation, because elements may have separated

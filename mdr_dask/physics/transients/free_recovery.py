@@ -27,7 +27,7 @@ from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Pa
 
 STRIDE = 2.0  # longest step towards a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
-# There are WINDOWS windows of time. The line travels WINDOW cells in the shortest, and twice as far in each next one.
+# There are WINDOWS windows of time. The line travels WINDOW cells in the first, and twice as far in each next one.
 WINDOW, WINDOWS = 8.0, 16
 
 
