@@ -240,7 +240,7 @@ def solve_sliding(
     Heights are relative to the highest node. A periodic line begins and ends at the highest node. On any other line,
     elements enter undeformed and recover beyond the end of the line, and the depth is the only unknown. `unknown`
     contains first guesses of the stretches e_m at the first node, then of the depth. The guesses are replaced by the
-    solution. `totals` receives the `totals` of the last `Passage`. Return an `Outcome`, which is `OUTSIDE_LINE` if an
+    solution. `totals` receives `Passage.totals` of the last sweep. Return an `Outcome`, which is `OUTSIDE_LINE` if an
     element is in contact at the end of a line that is not periodic.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times

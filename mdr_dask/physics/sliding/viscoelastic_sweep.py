@@ -52,7 +52,7 @@ def step_factors(length: float, deborah: FloatArray, decay: FloatArray, gain: Fl
     """
     for m in range(deborah.size):
         x = length / deborah[m]
-        if x < 0.02:  # the closed form of `area` would lose digits, the series is exact to rounding
+        if x < 0.02:  # the closed form of `area` would lose digits; the series is exact to rounding
             loss = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6)))))
             decay[m] = 1 - loss
             gain[m] = deborah[m] * loss

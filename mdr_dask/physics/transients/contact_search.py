@@ -61,7 +61,7 @@ from mdr_dask.physics.transients.patches import (
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of patches that end in a cell; the three sign changes of a cubic force allow fewer
-LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch leaves a run of cells, or a work array is full
+LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch extends beyond its run, or a work array is full
 
 # Entries of `Workspace.scan`, the state of the search
 (
@@ -102,7 +102,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> Workspace:
-    """Return a workspace for at most 4 p + 4096 contact patches, where p is `patches`."""
+    """Return a workspace for 4 p + 4096 contact patches, where p is the number of `patches` before the jump."""
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
     earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
@@ -113,10 +113,10 @@ def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> W
 class Motion(NamedTuple):
     """Changes of the depth and of the lift from the jump until now.
 
-    `rise` is the largest mean rate at which the lift has increased from any earlier instant until now. `fall` is the
-    largest rate at which the lift has decreased from one time step to the next. `deepest` is the largest depth so far,
-    and `highest` is the largest lift so far. `passes_top` is True if free elements may have passed the highest point of
-    the line without contact.
+    `rise` is the largest mean rate of increase of the lift in any interval that ends now. `fall` is the largest rate at
+    which the lift has decreased from one time step to the next. `deepest` is the largest depth so far, and `highest` is
+    the largest lift so far. `passes_top` is True if free elements may have passed the highest point of the line without
+    contact.
     """
 
     rise: float

@@ -25,7 +25,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Patches, Track, height_at
 
-STRIDE = 2.0  # longest step towards a place of separation, in cells
+STRIDE = 2.0  # longest step in the search for a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
 # There are WINDOWS windows of time. The line travels WINDOW cells in the first, and twice as far in each next one.
 WINDOW, WINDOWS = 8.0, 16
@@ -113,7 +113,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the shortest window with more than `distance` cells of travel, or the last index."""
+    """Return the index of the shortest window with more than `distance` cells of travel, or the last index if none."""
     return min(max(frexp(distance / WINDOW)[1], 0), WINDOWS - 1)
 
 

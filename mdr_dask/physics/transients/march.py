@@ -119,7 +119,7 @@ def _balance(
 def _weights(marching: Marching, found: Trajectory, now: int) -> tuple[float, float]:
     """Return a and b in the formula a d + b for the rate of the depth d at the instant with the index `now`."""
     depth = found.depth
-    if now == 1:  # from the known rate just after the jump
+    if now == 1:  # the formula contains the known rate just after the jump
         taken = found.time[1]
         return 2 / taken, -2 * depth[0] / taken - found.rate[0]
     scale = 1 / (marching.pace * (marching.onset + found.time[now]))

@@ -134,7 +134,7 @@ def press(solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, st
     if step <= 0:
         return
     for m in range(solid.times.size):
-        # elongation of the spring of the Prony term after a long time
+        # elongation of the spring of the Prony term after a long time at this speed
         steady = (u1 - u0) / step * solid.times[m]
         terms[i, m] = u1 - (steady + ((u0 - terms[i, m]) - steady) * fades[m])
 

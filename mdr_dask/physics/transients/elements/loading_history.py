@@ -171,9 +171,9 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
 
     During a time step, an element in contact moves at constant speed, and a free element recovers by the modes of the
     solid. The mean displacement depends on the load, but not on which elements are in contact. The depth for this mean
-    is the root of a convex function. If the line is not periodic, elements enter undeformed. Forces between elements
-    are interpolated by cubics in cells with full contact, and linearly in all other cells. The interpolation is most
-    accurate if the line has no kinks. `state` and `depth` describe the first instant and are not overwritten.
+    is the root of a convex function. If the line is not periodic, elements enter undeformed. Between two elements, the
+    force is interpolated by a cubic in cells with full contact, and linearly in all other cells. The interpolation is
+    most accurate if the line has no kinks. `state` and `depth` describe the first instant and are not overwritten.
     """
     now, out = deepcopy(state), np.full((3, schedule.instants.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
