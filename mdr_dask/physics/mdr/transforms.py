@@ -1,6 +1,6 @@
 """Transform of the profile f(r) of a body of revolution into its image g(x), with an error estimate.
 
-The substitution r = x sin t removes the square-root singularity of the integral. The integral is split at kinks.
+The substitution r = x sin t removes the square-root singularity of the integral, which is split at kinks of f(r).
 """
 
 from __future__ import annotations
