@@ -35,19 +35,21 @@ ROUNDING = 1e-5
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
 """Prior standard deviations, in widths of a curve: of the mean step of the shifts, and of a step about this mean."""
 
-BEND, BEND_SCATTER, BEND_DRIFT = 0.02, 3.0, 1.0
-"""Prior of the bend near each curve: the standard deviation of the second differences of the spline.
+BEND, NOISE = 0.02, 0.01
+"""Prior medians of the bend near each curve, in heights of a curve, and of the relative scatter of each channel.
 
-`BEND` is its median in heights of a curve, `BEND_SCATTER` the standard deviation of its logarithm, and `BEND_DRIFT` the
-standard deviation of the change of this logarithm from one curve to the next. The bend varies, because a master curve
-is bent in some places only.
+The bend is the standard deviation of the second differences of the spline.
+"""
+
+SCALE_SCATTER = 3.0
+"""Prior standard deviation of the logarithms of bend and scatter, which may thus be 400 times larger or smaller.
+
+The logarithm of the bend changes by about 1 from one curve to the next, because a master curve is bent in some places
+only.
 """
 
 REACH = 0.3
 """Distance over which the bend changes from one curve to the next, in widths of a curve."""
-
-NOISE, NOISE_SCATTER = 0.01, 2.0
-"""Prior of the relative scatter of each channel: median, and standard deviation of the logarithm of the scatter."""
 
 TREND = 10.0
 """Prior standard deviation of the mean step of drifting offsets, divided by that of the deviations from this mean."""
@@ -114,9 +116,9 @@ class Curves:
         are offsets, the logarithm of their standard deviation.
         """
         channels = self.y.shape[0]
-        drift = np.diff(np.eye(self.count), axis=0) / BEND_DRIFT
-        bends = drift.T @ drift + 1 / (self.count * BEND_SCATTER) ** 2
-        scales = [(NOISE / np.log(10), NOISE_SCATTER)] * channels + ([] if self.offset is None else [self.offset])
+        drift = np.diff(np.eye(self.count), axis=0)
+        bends = drift.T @ drift + 1 / (self.count * SCALE_SCATTER) ** 2
+        scales = [(NOISE / np.log(10), SCALE_SCATTER)] * channels + ([] if self.offset is None else [self.offset])
         means = [np.zeros(self.count - 1), np.repeat(np.log(BEND * self.height), self.count)]
         means.append(np.log([median for median, _ in scales]))
         widths = np.diag([width**-2.0 for _, width in scales])

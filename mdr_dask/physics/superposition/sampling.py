@@ -13,19 +13,19 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.posterior import CELLS, STEP_SCATTER, Curves, Solved, solve, step_covariance
 
 HOPS = 2
-"""Number of jumps after each move; a jump changes the step between two neighbouring curves."""
+"""Number of jumps after each move; a jump changes the step between two neighbouring curves. Chosen by trial."""
 
-CHAINS, WARM, KEPT = 24, 16, 20
-"""Number of chains, and numbers of moves of each chain that are discarded and kept.
+CHAINS, KEPT = 24, 20
+"""Number of chains, and number of moves of each chain that are kept; as many moves before these are discarded.
 
 480 draws determine the ends of a 95 % interval to about 5 %.
 """
 
 CONVERGED = 1.1
-"""Potential scale reduction factor below which chains count as converged."""
+"""Potential scale reduction factor below which chains count as converged, as Gelman and Rubin recommend."""
 
-PATH, STEPS = 1.5, 3
-"""Length of a move in standard deviations (about a quarter of a period, pi/2), and number of steps of a move."""
+STEPS = 3
+"""Number of steps of a move, which is a quarter of a period of a normal density, on average. Chosen by trial."""
 
 
 def first_guess(curves: Curves) -> FloatArray:
@@ -77,7 +77,7 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
     scale = _scale(curves, start)
     place = start + generator.standard_normal((CHAINS, start.size)) @ scale.T
     here, share = solve(curves, place), 1.0
-    for _ in range(WARM):
+    for _ in range(KEPT):
         place, here, accepted = _moved(curves, place, here, share * scale, generator)
         share = min(share * (1.25 if accepted > 0.8 else 0.75), 1.0)
     for length in (1, 2, 4, 8):
@@ -95,7 +95,7 @@ def _moved(
     curves: Curves, place: FloatArray, here: Solved, scale: FloatArray, generator: np.random.Generator
 ) -> tuple[FloatArray, Solved, float]:
     """Move all chains by one Hamiltonian move and `HOPS` jumps; also return the acceptance probability of the move."""
-    length = PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
+    length = np.pi / 2 / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
     momentum = generator.standard_normal(place.shape)
     speed, new, there = momentum, place, here
     for _ in range(STEPS):
