@@ -15,7 +15,7 @@ from benchmarks.solvers.solver import Found, Solver, Truth, one_case
 from mdr_dask.models.mixed_lubrication import MODEL, declaration
 from mdr_dask.physics.lubrication import breakthrough, film_formulas, grids, line_contact
 from mdr_dask.physics.lubrication.clusters import find_clusters
-from mdr_dask.physics.lubrication.newton import Grid, Pace, newton
+from mdr_dask.physics.lubrication.newton import Grid, newton
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.splines import closest
@@ -49,7 +49,7 @@ def uniform(case: line_contact.LineContact, count: int) -> Found | None:
     start = max(grids.inlet_position(guess), -20 * np.sqrt(2 * guess) - 1)
     grid = Grid.of(np.linspace(start, 1.5, count))
     pressure = np.sqrt(np.maximum(1 - grid.nodes**2, 0))
-    found = newton(grid, case.liquid, case.film_number, pressure, guess, Pace(0.12, 200))
+    found = newton(grid, case.liquid, case.film_number, pressure, guess, 0.12)
     return Found([found.central, float(found.film.min())]) if found.outcome == Outcome.CONVERGED else None
 
 

@@ -13,6 +13,8 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from mdr_dask.arrays import FloatArray
 
+SLOWEST = 0.5  # Newton's method reuses a Jacobian while each step is smaller than this fraction of the previous step
+
 
 class Factors(NamedTuple):
     """The triangular factors of the transpose of a matrix, and the row exchanges of the factorisation."""

@@ -83,7 +83,7 @@ def refine(
     cases: int,
     levels: Sequence[int],
     accuracy: float,
-    order: float,
+    order: ArrayLike,
     *,
     safety: float = SAFETY,
     floors: ArrayLike = 0.0,
@@ -99,14 +99,14 @@ def refine(
 
     The accuracy of an output is relative to the largest absolute value of the output, or to the entry of the output in
     `floors` if this entry is larger. If `accuracy` is infinite, the result on the second level is accepted. `order` is
-    the order of convergence of the dominant part of the error. Only the first `requested` outputs must meet the
-    accuracy, or all outputs if `requested` is None.
+    the order of convergence of the dominant part of the error, one number or one for each output. Only the first
+    `requested` outputs must meet the accuracy, or all outputs if `requested` is None.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all requested
     outputs of this case, because a single output may have the same value on two grids by chance. Outputs that are not
     requested then have infinite errors. Choose `shared` = False for outputs that converge at different rates.
     """
-    reduction = 2.0**order
+    reduction = np.reshape(2.0 ** np.asarray(order), (-1, 1))
     left = np.arange(cases)
     coarse = solve(levels[0], left)
     floor = np.broadcast_to(np.asarray(floors, dtype=np.float64), len(coarse.values))

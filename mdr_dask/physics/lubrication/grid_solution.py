@@ -44,20 +44,6 @@ class GridSolution:
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, 2), 0.0), 0.0)
 
-    def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at other nodes, with the steep front of the pressure moved from `self.front` to `front`.
-
-        The two nodes around the new front get the pressures half a cell upstream and half a cell downstream of the old
-        front. These two pressures hardly depend on the grid.
-        """
-        if np.isnan(front + self.front):
-            return self.pressure_between(nodes)
-        before, behind = cell_around(self.nodes, self.front)
-        beside = self.front + 0.5 * (behind - before) * np.array([-1.0, 1.0])
-        there = cell_around(nodes, front)
-        moved = np.interp(nodes, [front - 1, *there, nodes[-1]], [0.0, *(beside - there), 0.0])
-        return np.asarray(np.interp(nodes + moved, self.nodes, self.pressure))
-
     @cached_property
     def density(self) -> FloatArray:
         """Density of nodes that suits this solution, evaluated at the nodes."""
@@ -86,15 +72,6 @@ class GridSolution:
         """Position of the spike (a second pressure maximum near the outlet), or NaN without a spike."""
         peak, _ = self._spike
         return float(self.nodes[peak]) if peak else float("nan")
-
-    @cached_property
-    def front(self) -> float:
-        """Position behind the spike where the pressure equals the minimum before the spike, or NaN without a spike."""
-        peak, lowest = self._spike
-        if not peak:
-            return float("nan")
-        after = peak + int(np.argmax(self.pressure[peak:] <= lowest))
-        return float(np.interp(lowest, self.pressure[[after, after - 1]], self.nodes[[after, after - 1]]))
 
     @cached_property
     def _spike(self) -> tuple[int, float]:

@@ -48,32 +48,16 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
     return np.asarray(nodes)
 
 
-def aligned(
-    positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float
-) -> tuple[FloatArray, float]:
+def aligned(positions: FloatArray, density: FloatArray, count: int, rupture: float) -> tuple[FloatArray, float]:
     """Return about `count` nodes with a given density, and the product of node spacing and density.
 
-    A node lies at `rupture`, where the film ends, so that errors on several grids can be compared. The position `front`
-    (see `GridSolution.front`), unless it is NaN, lies near the middle of a cell.
+    A node lies at `rupture`, where the film ends, so that errors on several grids can be compared.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
-    cells = round(reached / number[-1] * (count - 1))
-    if front < rupture:
-        cells = _halved_by(_cells_before(front, positions, density, number) / reached, cells)
-    spacing = reached / cells
+    spacing = reached / round(reached / number[-1] * (count - 1))
     last = int(np.ceil(number[-1] / spacing * (1 - 1e-12)))
     return _placed(positions, density, number, spacing * np.arange(last + 1)), float(spacing)
-
-
-def _halved_by(share: float, cells: int) -> int:
-    """Return an integer n near `cells` for which n times `share` is closest to an integer plus one half.
-
-    `share` is the number of cells before the front, divided by the number of cells before the end of the film.
-    """
-    far = int(0.5 / max(1 - share, 4 / cells))  # the fractional part of n * share repeats if n grows by 1 / (1 - share)
-    near = cells + np.arange(-far, far + 1)
-    return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:

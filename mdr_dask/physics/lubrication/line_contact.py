@@ -18,22 +18,21 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
 from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
-from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
+from mdr_dask.physics.lubrication.newton import Grid, Liquid, film_on, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate, Solution, refine
 
 NODES = (40, 80, 160, 320, 640, 1280)  # numbers of nodes of the grids; a Newton step with 1280 nodes takes about 0.1 s
-ORDER = 3.0  # order of convergence of the values extrapolated from two grids
+ORDER = 3.0  # order of convergence of the films extrapolated from two grids
+ORDER_OF_READINGS = 2.0  # order of convergence of other extrapolated values, which can depend on the pressure spike
 ACCURACY = 1e-3  # allowed relative error of the films if no accuracy is given
-PRELIMINARY = 2  # the preliminary grids, which determine the density of nodes, have NODES[PRELIMINARY] nodes
-#: Attempts at the first solution of a case; the second attempt is slow but hardly ever fails. Each attempt has a guess
-#: of the film, divided by the expected film; an upper limit of the guess, divided by the square of the inlet position;
-#: the number of nodes; and the limits of Newton's method.
-ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Limits of Newton's method on all further grids. If no solution is found within the first limits, the second limits
-#: are used with another guess.
-PACES = (Pace(0.12, 16), Pace(0.03, 250))
+#: Attempts at the first solution of a case, chosen by trial; the second attempt is slow but hardly ever fails. Each
+#: attempt has a guess of the film, divided by the expected film; an upper limit of the guess, divided by the square of
+#: the inlet position; and the number of nodes, which is also the number for the density of nodes of all further grids.
+ATTEMPTS = ((1.5, 0.2, 121), (2.5, 0.4, 361))
+#: `clip` of Newton's method in the first and in the second attempt on every grid, chosen by trial.
+CLIPS = (0.12, 0.03)
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
@@ -156,7 +155,7 @@ def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) ->
 
 
 def _solve_on(
-    case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, pace: Pace, spacing: float = np.nan
+    case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, clip: float, spacing: float = np.nan
 ) -> tuple[Outcome, GridSolution]:
     """Solve on one grid from a guess of the pressure at the nodes."""
     grid = Grid.of(nodes)
@@ -164,22 +163,22 @@ def _solve_on(
     guess[0] = guess[-1] = 0.0
     # Newton's method needs a positive film in the initial guess
     lift = max(0.0, 0.1 * central - float(film_on(grid, guess, central).min()))
-    found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
+    found = newton(grid, case.liquid, case.film_number, guess, central + lift, clip)
     return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, spacing)
 
 
 def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
     """Return the solution whose density of nodes is used for all grids of `NODES`."""
-    for factor, starved, count, pace in ATTEMPTS:
+    for (factor, starved, count), clip in zip(ATTEMPTS, CLIPS, strict=True):
         guess = factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
         guess = min(guess, starved * inlet**2)
         nodes = grids.first_grid(guess, inlet, count)
-        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, pace)
+        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, clip)
         if outcome == Outcome.CONVERGED:
             break
     for _ in range(2 if outcome == Outcome.CONVERGED else 0):
-        adapted_outcome, adapted = _refined(case, [state], state, NODES[PRELIMINARY])
+        adapted_outcome, adapted = _refined(case, [state], state, count)
         if adapted_outcome == Outcome.CONVERGED:
             state = adapted
     return outcome, state
@@ -192,14 +191,13 @@ def _refined(
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
     end = float(expected(before, lambda grid: grid.rupture, spacing))
-    front = float(expected(before, lambda grid: grid.front, spacing))
-    nodes, spacing = grids.aligned(source.nodes, source.density, count, end, front)
-    guess = np.maximum(expected(before, lambda grid: grid.pressure_carried(nodes, front), spacing), 0.0)
+    nodes, spacing = grids.aligned(source.nodes, source.density, count, end)
+    guess = np.maximum(expected(before, lambda grid: grid.pressure_between(nodes), spacing), 0.0)
     central = float(expected(before, lambda grid: grid.central, spacing))
-    outcome, found = _solve_on(case, nodes, guess, central, PACES[0], spacing)
+    outcome, found = _solve_on(case, nodes, guess, central, CLIPS[0], spacing)
     if outcome != Outcome.CONVERGED:
         straight = np.interp(nodes, last.nodes, last.pressure)
-        outcome, found = _solve_on(case, nodes, straight, last.central, PACES[1], spacing)
+        outcome, found = _solve_on(case, nodes, straight, last.central, CLIPS[1], spacing)
     return outcome, found
 
 
@@ -251,7 +249,7 @@ def solve_film(
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum]) / scales, *readings]
 
     def add(count: int) -> Outcome:
-        before = solved[-2:] if solved and count > NODES[PRELIMINARY] else [source]
+        before = solved[-2:] or [source]
         outcome, found = _refined(case, before, source, count)
         if outcome == Outcome.CONVERGED:
             solved.append(found)
@@ -273,7 +271,7 @@ def solve_film(
         1,
         NODES[1:],
         accuracy,
-        ORDER,
+        [ORDER, *[ORDER_OF_READINGS] * len(readings)],
         floors=[0.0, *(floors or np.zeros(len(readings)))],
         shared=False,
         requested=1 if films_only else None,
@@ -294,7 +292,7 @@ def operations(accuracy: float) -> float:
     """Return the approximate number of operations of `solve_film`: 30 n^2 in each of ten steps on a grid of n nodes."""
     # each finer grid divides the error by 8, because the error is of third order
     grids_needed = 1.0 if accuracy == 0 else min(np.log(1 / accuracy) / np.log(8) / len(NODES), 1.0)
-    nodes = np.array([NODES[PRELIMINARY]] * 2 + [*NODES[: round(grids_needed * len(NODES))]])
+    nodes = np.array([ATTEMPTS[0][-1]] * 3 + [*NODES[: round(grids_needed * len(NODES))]])
     return 300.0 * float(np.sum(nodes**2))
 
 

@@ -16,17 +16,14 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
-from mdr_dask.physics.linear import factorise
+from mdr_dask.physics.linear import SLOWEST, factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-_QUADRATIC = 1.0 / 3.0  # weight of quadratic interpolation (QUICK) in the Couette flux; linear upwinding has the rest
+EPS = float(np.finfo(np.float64).eps)
 _FILM_SHARE = 0.8  # one Newton step may reduce the film at a node by at most this fraction
-_LEAST_SHARE = 1e-9  # the film has collapsed if only this fraction of a step, or less, is allowed
-_SHRINKS = 0.1  # a factorised Jacobian is reused while each step is smaller than this fraction of the previous step
 #: Largest relative size of the last Newton step. The remaining error is about the square of this size.
-#: After a step with a reused Jacobian, the remaining error is larger. The last step must then be 100 times smaller.
-_TOLERANCE = 1e-4
+_TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))
 
 
 class Grid(NamedTuple):
@@ -43,13 +40,6 @@ class Grid(NamedTuple):
         weights[:-1] += np.diff(nodes) / 2
         weights[1:] += np.diff(nodes) / 2
         return cls(nodes, weights, influence_matrix(nodes))
-
-
-class Pace(NamedTuple):
-    """Limits: `clip` for pressure changes per step, divided by the largest pressure; `most` for the number of steps."""
-
-    clip: float
-    most: int
 
 
 class Iterate(NamedTuple):
@@ -114,24 +104,6 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
     return scale * mean, -scale * (mean + slope), scale * slope
 
 
-@jit
-def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of the nodes f-1, f and f+1 in an interpolated value halfway between f and f+1.
-
-    The liquid flows from node f to node f+1.
-    """
-    if f == 0:
-        return 0.0, 0.5, 0.5
-    dx = nodes[f + 1] - nodes[f]
-    upstream = nodes[f] - nodes[f - 1]
-    first = -dx * dx / (4.0 * upstream * (upstream + dx))
-    last = (0.5 * dx + upstream) / (2.0 * (upstream + dx))
-    linear = -0.5 * dx / upstream
-    w0 = linear + _QUADRATIC * (first - linear)
-    w2 = _QUADRATIC * last
-    return w0, 1.0 - w0 - w2, w2
-
-
 class Imbalance(NamedTuple):
     """Inflow minus outflow of every volume, shape (n,), and the derivatives of this difference, shape (n, 4).
 
@@ -166,18 +138,20 @@ def balance(
         film = 0.5 * (H[f] + H[g])
         density = 0.5 * (rho[f] + rho[g])
         conductance = film**3 / K
-        w0, w1, w2 = _couette_weights(nodes, f)
-        e = f - 1 if f > 0 else 0  # at the first face, the weight w0 is zero, so any index e will do
-        couette = w0 * rho[e] * H[e] + w1 * rho[f] * H[f] + w2 * rho[g] * H[g]
+        # Couette flux: linear extrapolation from two nodes upstream of the face, or the value at the first node
+        e = max(f - 1, 0)
+        w0 = -0.5 * dx / (nodes[f] - nodes[e]) if f > 0 else 0.0
+        w1 = 1.0 - w0
+        couette = w0 * rho[e] * H[e] + w1 * rho[f] * H[f]
         flux = density * conductance * mobility * gradient - couette
         steeper = 1.5 * density * film**2 / K * mobility * gradient
-        h0, h1, h2 = -w0 * rho[e], steeper - w1 * rho[f], steeper - w2 * rho[g]
+        h0, h1, h2 = -w0 * rho[e], steeper - w1 * rho[f], steeper
         denser = 0.5 * conductance * mobility * gradient
         p0 = -w0 * rho_slope[e] * H[e]
         p1 = density * conductance * (by_left * viscosity_slope[f] * gradient - mobility / dx)
         p1 += rho_slope[f] * (denser - w1 * H[f])
         p2 = density * conductance * (by_right * viscosity_slope[g] * gradient + mobility / dx)
-        p2 += rho_slope[g] * (denser - w2 * H[g])
+        p2 += rho_slope[g] * denser
         R[f] += flux
         R[g] -= flux
         for derivative, d0, d1, d2 in ((by_pressure, p0, p1, p2), (by_film, h0, h1, h2)):
@@ -317,7 +291,7 @@ def _take_step(
     if the film closes.
     """
     share = _step_length(grid, P, H, step, change, clip)
-    if not share > _LEAST_SHARE:
+    if not share > EPS:
         return central, np.nan
     size = max(np.max(np.abs(step)) / np.max(P), abs(change) / central) if share == 1.0 else np.inf
     for i in range(P.size):
@@ -327,42 +301,42 @@ def _take_step(
     return central, size if central > 0.0 and np.min(H) > 0.0 else np.nan
 
 
-def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
+def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, clip: float) -> Iterate:
     """Solve for pressure and film on one grid. The outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
 
     The guessed pressure must be zero at both ends and nowhere negative. The guessed central film must be so large that
-    the film is positive at all nodes.
+    the film is positive at all nodes. One step may change a pressure by at most `clip` times the largest pressure.
     """
     n = guess.size
     P, H = guess.copy(), film_on(grid, guess, central)
     state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
     solved, factors, b = listed[:0], None, np.empty(0)
-    size, before, last = np.inf, 1.0, _TOLERANCE
-    for steps in range(pace.most + 1):
+    size, before = np.inf, 1.0
+    most = int(6 / clip)  # for changes of pressures by up to six times the largest pressure; chosen by trial
+    for steps in range(most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
         # at least two Newton steps are taken, because the first step may be small by chance
-        if steps > 1 and size < last and same:
+        if steps > 1 and size < _TOLERANCE and same:
             return Iterate(Outcome.CONVERGED, P, central, H)
-        if steps == pace.most:
+        if steps == most:
             break
-        if same and size < _SHRINKS * before:
+        if same and size < SLOWEST * before:
             _fill_imbalance(grid, P, found.value, active, b)
-            last = 0.01 * _TOLERANCE
         else:
             solved, b = active.copy(), np.empty(active.size + 1)
             A = workspace[: b.size**2].reshape(b.size, b.size)
             _fill_equations(grid, P, found, active, A, b)
-            factors, last = factorise(A), _TOLERANCE
+            factors = factorise(A)
         if factors is None:
             return Iterate(Outcome.SINGULAR, P, central, H)
         solution = factors.solve(b)
         step = -P
         step[active] = solution[:-1]
         before = size if steps else 1.0
-        central, size = _take_step(grid, pace.clip, P, central, H, step, solution[-1])
+        central, size = _take_step(grid, clip, P, central, H, step, solution[-1])
         if np.isnan(size):
             return Iterate(Outcome.FILM_COLLAPSED, P, central, H)
     return Iterate(Outcome.TOO_MANY_STEPS, P, central, H)

@@ -13,22 +13,21 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
-from mdr_dask.physics.linear import Factors, factorise
+from mdr_dask.physics.linear import SLOWEST, Factors, factorise
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.wear.slip import TOLERANCE, GrossSlip, Moment, PartialSlip
 
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
-MOST_STEPS = 20000  # a march with more time steps fails, to limit the computing time
-MOST_ITERATIONS = 12  # largest number of Newton iterations in a time step; a sufficiently short step needs about three
-GROWTH = 1.8  # largest ratio of a time step to the previous one; without a limit, formulas of order 3 are unstable
+#: Largest ratio of a time step to the previous one: if the steps grow faster all the time, BDF of order 3 is unstable.
+GROWTH = (1.0 + 5.0**0.5) / 2.0
 
 Problem = PartialSlip | GrossSlip
 
 
 class NotConvergedError(ArithmeticError):
-    """Raised if a march needs too many time steps, or if even a very short time step fails."""
+    """Raised if even a very short time step fails."""
 
 
 def march(
@@ -50,8 +49,6 @@ def march(
     step = first
     while history[-1].time < end and not stops(history[-1]):
         time = history[-1].time
-        if len(history) > MOST_STEPS:
-            raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {MOST_STEPS}")
         if time + step == time:
             raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
@@ -132,9 +129,9 @@ class _Newton:
     def _iterate(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
     ) -> FloatArray | None:
-        """Return the solution, or None if the iteration fails, or is slow because the Jacobian is reused."""
+        """Return the solution, or None if the changes grow, or shrink slowly because the Jacobian is reused."""
         is_reused, last = self.factors is not None, np.inf
-        for _ in range(MOST_ITERATIONS):
+        while True:
             residual = self.problem.residual(unknowns, theta, known(unknowns))
             if not np.isfinite(residual).all():
                 return None
@@ -149,15 +146,14 @@ class _Newton:
                 return None
             rate = size / last
             # the sum of all further changes, if the ratio of successive changes stays the same
-            left = size * rate / (1.0 - rate) if 0.0 < rate <= 0.5 else size
+            left = size * rate / (1.0 - rate) if 0.0 < rate <= SLOWEST else size
             if left < TOLERANCE:
                 return unknowns
-            if rate > 0.5:
-                if is_reused:
-                    return None
+            if rate > (SLOWEST if is_reused else 1.0):
+                return None
+            if rate > SLOWEST:
                 self.factors = None
             last = size
-        return None
 
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray

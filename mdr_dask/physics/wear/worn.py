@@ -21,7 +21,6 @@ from mdr_dask.physics.mdr.transforms import Function, gauss
 from mdr_dask.physics.refine import SAFETY
 
 EPS = float(np.finfo(np.float64).eps)
-JUMP_WIDTH = 1e-9  # half-width of a jump of the image at the stick border, divided by the radius of this border
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,11 +177,9 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        # the image jumps at the border; points very close to the border are left out
-        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)
-        return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
+        return np.asarray(profile.image_slope(x) + np.where(x > c, scar.slope(inside), 0.0))
 
-    near = np.array([border * (1.0 - JUMP_WIDTH), border * (1.0 + JUMP_WIDTH), edge * (1.0 - 1e-13)])
+    near = np.array([border * (1.0 - EPS), border * (1.0 + EPS), edge * (1.0 - EPS)])
     before, after, last = scar.change(near)
     jumps = [(border, float(after) - (float(before) if border > c else 0.0))]
     gap = depth - float(profile.image(near[2:])[0]) - float(last)

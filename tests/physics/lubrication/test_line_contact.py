@@ -26,7 +26,7 @@ def test_kapitza() -> None:
     """Rigid, isoviscous, incompressible: W h0/(U R) = 4.894968; the inlet at 300 sqrt(2 Hc) costs 2e-5."""
     M = 0.01
     found = solve_film(LineContact(M, 0.0), accuracy=1e-4)
-    assert found.minimum_film.value * RIGID * M**2 == pytest.approx(film.RIGID_ISOVISCOUS, rel=5e-5)
+    assert found.minimum_film.value * RIGID * M**2 == pytest.approx(film.RIGID_ISOVISCOUS, rel=1e-4)
     assert found.finest.rupture / np.sqrt(2 * found.minimum_film.value) == pytest.approx(0.4751, rel=0.02)
 
 
