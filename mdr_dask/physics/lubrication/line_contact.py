@@ -32,7 +32,7 @@ ACCURACY = 1e-3  # allowed relative error of the films if no accuracy is given
 #: the inlet position; and the number of nodes, which is also the number for the density of nodes of all further grids.
 ATTEMPTS = ((1.5, 0.2, 121), (2.5, 0.4, 361))
 #: `clip` of Newton's method in the first and in the second attempt on every grid, chosen by trial.
-CLIPS = (0.12, 0.03)
+CLIPS = (0.12, 0.06)
 NO_ESTIMATE = Estimate(np.asarray(np.nan), np.asarray(np.nan))
 
 #: Function that evaluates a quantity, or a profile at fixed positions, on one grid.

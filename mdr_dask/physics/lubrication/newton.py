@@ -19,11 +19,9 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import SLOWEST, factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import CLOSE, EPS, MOST_ITERATIONS
 
-EPS = float(np.finfo(np.float64).eps)
 _FILM_SHARE = 0.8  # one Newton step may reduce the film at a node by at most this fraction
-#: Largest relative size of the last Newton step. The remaining error is about the square of this size.
-_TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))
 
 
 class Grid(NamedTuple):
@@ -313,15 +311,14 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
     solved, factors, b = listed[:0], None, np.empty(0)
     size, before = np.inf, 1.0
-    most = int(6 / clip)  # for changes of pressures by up to six times the largest pressure; chosen by trial
-    for steps in range(most + 1):
+    for steps in range(MOST_ITERATIONS + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
         # at least two Newton steps are taken, because the first step may be small by chance
-        if steps > 1 and size < _TOLERANCE and same:
+        if steps > 1 and size < CLOSE and same:
             return Iterate(Outcome.CONVERGED, P, central, H)
-        if steps == most:
+        if steps == MOST_ITERATIONS:
             break
         if same and size < SLOWEST * before:
             _fill_imbalance(grid, P, found.value, active, b)

@@ -15,7 +15,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import SLOWEST, Factors, factorise
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.wear.slip import TOLERANCE, GrossSlip, Moment, PartialSlip
+from mdr_dask.physics.refine import CLOSE
+from mdr_dask.physics.wear.slip import GrossSlip, Moment, PartialSlip
 
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
 #: extrapolated from the previous steps.
@@ -147,7 +148,7 @@ class _Newton:
             rate = size / last
             # the sum of all further changes, if the ratio of successive changes stays the same
             left = size * rate / (1.0 - rate) if 0.0 < rate <= SLOWEST else size
-            if left < TOLERANCE:
+            if left < CLOSE:
                 return unknowns
             if rate > (SLOWEST if is_reused else 1.0):
                 return None
@@ -162,9 +163,9 @@ class _Newton:
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
-            moved[column] += TOLERANCE
+            moved[column] += CLOSE
             shifted = self.problem.residual(moved, theta, known(moved))
-            matrix[:, column] = (shifted - residual) / TOLERANCE
+            matrix[:, column] = (shifted - residual) / CLOSE
         self.factors = factorise(matrix)
 
 

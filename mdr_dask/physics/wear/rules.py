@@ -18,8 +18,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.refine import CLOSE, EPS
 from mdr_dask.physics.wear.worn import (
-    EPS,
     Scar,
     Worn,
     check_stick_radius,
@@ -218,7 +218,7 @@ def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_val
     if not high_value < 0.0:
         return high
     # the order of the method is 1.7: if the value has this size, the next radius is exact except for rounding
-    tolerance = math.sqrt(EPS) * low_value
+    tolerance = CLOSE * low_value
     radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
     while True:
         value, last = _scar_integral(rule, radius, 0, cuts), radius

@@ -20,8 +20,8 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.refine import CLOSE
 
-TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))  # tolerance and step of the finite differences of Newton's method
 #: Weight of the stick border in the error of a time step, relative to the weight of the depth. The weight is large
 #: because f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
@@ -151,7 +151,7 @@ class PartialSlip:
     def admits(self, unknowns: FloatArray) -> bool:
         """Return whether y >= 0 in the slip zone (if the border moves), or s >= 0 (if the border does not move)."""
         positive = unknowns[: self.size - 1] if self.border is None else self.slip(unknowns)
-        return bool(np.min(positive) >= -TOLERANCE)
+        return bool(np.min(positive) >= -CLOSE)
 
     def radius(self, place: float) -> float:
         """Return the radius that belongs to a value of q."""

@@ -18,9 +18,7 @@ from scipy.optimize import brentq
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.refine import SAFETY
-
-EPS = float(np.finfo(np.float64).eps)
+from mdr_dask.physics.refine import EPS, SAFETY
 
 
 @dataclass(frozen=True, eq=False)
