@@ -24,8 +24,8 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.sliding.cases import Cases, first_depths, strides
 
-BLOCK = 256  # number of nodes in a block
-LANES = 8  # number of cases in one vector instruction
+BLOCK = 256  # number of nodes in a block, chosen by trial
+LANES = 8  # number of cases in one vector instruction: the widest vector registers hold eight numbers
 
 # Rows of `Lanes.sums`, and the number of these rows
 CARRIED, STIFFNESS, DRAG, SUMS = range(4)

@@ -14,7 +14,7 @@ from mdr_dask.physics.outcome import Outcome
 Scheme = Literal["hermite", "backward_euler"]
 
 COARSENING = 8
-"""Ratio of the numbers of nodes of successive grids in `strides`, chosen by trial: 4 to 16 take about the same time."""
+"""Ratio of the numbers of nodes of successive grids in `strides`, chosen by trial."""
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
 """Names of the results of a case, in the order of the rows of `Steady.columns`."""

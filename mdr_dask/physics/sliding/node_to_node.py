@@ -31,7 +31,7 @@ from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import series
 
-BLOCK = 32  # number of cells in a block
+BLOCK = 32  # number of cells in a block, chosen by trial
 WING = 4  # number of nodes on each side of a cell from which the finer nodes in the cell are interpolated
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes that `refine` needs before and after the period
 
@@ -254,10 +254,10 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
             height[place], slope[place] = value, rate / refinement
 
 
-ITERATIONS = 25
-COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LANES = 64  # number of cases that are computed together
-RESOLVED = 10  # a grid is fine enough only if at least this number of cells is in contact
+ITERATIONS = 25  # chosen by trial; cases without a solution on a coarse grid would use up a larger number
+COARSENING, COARSEST = 4, 64  # chosen by trial; the search starts on at most COARSENING * COARSEST nodes
+LANES = 64  # number of cases that are computed together, chosen by trial
+RESOLVED = 10  # chosen by trial; a grid is fine enough only if at least this number of cells is in contact
 
 ORDER = 3.0  # order of convergence; measured: 3.3 (the order is 4 inside cells, and lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
