@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.mixed_lubrication.declaration import POSITIONS
@@ -29,7 +29,7 @@ class Revolution:
     in each window, in m. `parts` is the number of equal parts into which the revolution is divided.
     """
 
-    contact: NDArray[np.int32] | IntArray
+    contact: IntArray
     stride: int
     unit: float
     parts: int
@@ -42,7 +42,7 @@ class Revolution:
     @property
     def length(self) -> float:
         """Length in intimate contact in m, averaged over the windows."""
-        return int(self.contact.sum(dtype=np.int64)) / self.contact.size * self.unit
+        return float(self.contact.mean()) * self.unit
 
     @property
     def standard_error(self) -> float:
@@ -60,7 +60,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
     width, stride = operation.width / spacing, 1
     if creep == 0:
         clusters = find_clusters(lines.sum(axis=0), operation.film / operation.scale, spacing, operation.strength)
-        contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width)
+        contact: IntArray = breakthrough.contact_lengths(clusters, width)
     else:
         # a finer grid has more windows, so that the change between two grids includes the error of the window spacing
         stride = max(1, int(operation.width / operation.source.length * operation.source.points[0] / WINDOWS))

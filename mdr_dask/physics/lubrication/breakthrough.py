@@ -11,14 +11,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares
 
-PARTS = 64  # number of equal parts of the spacing of nodes; lengths in contact are rounded to whole parts
+#: Number of equal parts of the spacing of nodes. Lengths are whole numbers of parts, as sums of integers are exact.
+#: The length of a line of 2^30 spacings is within the range of integers.
+PARTS = 2**32
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
@@ -36,7 +38,7 @@ def _counted(length: float) -> int:
 
 
 @jit
-def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
+def _block(jumps: IntArray, begin: int, count: int, number: int) -> None:
     """Add `number` to the lengths in contact of the `count` successive windows from node `begin` on.
 
     `jumps` holds the differences between the lengths in contact of neighbouring windows.
@@ -55,7 +57,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 
 @jit
-def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: NDArray[np.int32]) -> None:
+def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: IntArray) -> None:
     """Add the contribution of a cluster to the windows that contain only its beginning or only its end."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
@@ -80,7 +82,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: ND
 
 
 @jit
-def _add_middles(clusters: Clusters, c: int, window: float, jumps: NDArray[np.int32]) -> None:
+def _add_middles(clusters: Clusters, c: int, window: float, jumps: IntArray) -> None:
     """Add the contribution of a cluster to all windows that lie entirely within this cluster."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
@@ -99,7 +101,7 @@ def _add_middles(clusters: Clusters, c: int, window: float, jumps: NDArray[np.in
 
 
 @jit
-def _collect(clusters: Clusters, window: float, jumps: NDArray[np.int32]) -> None:
+def _collect(clusters: Clusters, window: float, jumps: IntArray) -> None:
     """Write the lengths in contact of all windows to `jumps`, which must contain only zeros before the call."""
     points = jumps.size - 1
     # if a part of a cluster is longer than `reach`, this part cannot break the layer
@@ -122,13 +124,13 @@ def _collect(clusters: Clusters, window: float, jumps: NDArray[np.int32]) -> Non
         jumps[p] = height
 
 
-def contact_lengths(clusters: Clusters, window: float) -> NDArray[np.int32]:
+def contact_lengths(clusters: Clusters, window: float) -> IntArray:
     """Return the length in intimate contact, in parts (see `PARTS`), of the window that begins at each node.
 
     `window` is the length of a window in spacings, and must not exceed the length of the line. The breakthrough
     probability is the fraction of windows whose length in contact is not zero.
     """
-    trace = np.zeros(clusters.points + 1, dtype=np.int32)
+    trace = np.zeros(clusters.points + 1, dtype=np.int64)
     if clusters.start.size:
         _collect(clusters, window, trace)
     return trace[:-1]

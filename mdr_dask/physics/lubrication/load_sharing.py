@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import erfc, exp, log, pi, sqrt
+from sys import float_info
 from typing import NamedTuple
 
 from scipy.optimize import brentq
-
-_CLOSED = -37.0  # distance d (see `mean_overlap`), in rms heights, with a mean gap of about 1e-301
 
 
 def mean_overlap(distance: float) -> float:
@@ -28,10 +27,11 @@ def mean_overlap(distance: float) -> float:
 
 def distance_of_means(gap: float) -> float:
     """Return the distance d (see `mean_overlap`) for a mean gap ``<(d - z)+>``, in units of the rms height."""
-    if mean_overlap(-_CLOSED) >= gap:
-        return _CLOSED
-    # d is at most `gap`, because the mean gap, `mean_overlap(-d)`, is at least d; its logarithm varies slowly with d
-    return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, gap + 1, xtol=1e-13))
+    gap = max(gap, float_info.min)
+    # `mean_overlap(-d)` is the mean gap. It is at least d, and at most exp(-d^2 / 2) / sqrt(2 pi) if d is negative.
+    # The logarithm of the mean gap varies slowly with d.
+    least = -sqrt(max(-2 * log(gap * sqrt(2 * pi)), 0.0)) - gap
+    return float(brentq(lambda d: log(max(mean_overlap(-d), float_info.min) / gap), least, gap + 1))
 
 
 def asperity_pressure(film: float, rms: float, wavelength: float, E_star: float) -> float:
