@@ -9,13 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from mdr_dask.errors import LOOK, PAUSE
 from mdr_dask.units import seconds
 
 if TYPE_CHECKING:
     from mdr_dask.execute import Progress
-
-#: `PAUSE`: seconds between two plain lines. `LIVE_PAUSE`: seconds between two updates of the live line.
-PAUSE, LIVE_PAUSE = 5.0, 0.5
 
 #: Function that draws the progress. Its arguments: the progress, and the times in s since the start and since the last
 #: change of the progress.
@@ -28,12 +26,12 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:
-        with _in_notebook() as draw, _beating(draw, LIVE_PAUSE) as show:
+        with _in_notebook() as draw, _beating(draw, LOOK) as show:
             yield show
     elif sys.stderr is None:
         yield lambda _: None
     elif sys.stderr.isatty():
-        with _live() as draw, _beating(draw, LIVE_PAUSE) as show:
+        with _live() as draw, _beating(draw, LOOK) as show:
             yield show
     else:
         with _beating(lambda *known: _write(describe(*known)), PAUSE) as show:

@@ -5,6 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+#: `LOOK`: time in s between two checks of what other processes have done. `PAUSE`: time in s of waiting after which a
+#: message is printed, and after which an unanswered question counts as failed. Chosen by trial.
+LOOK, PAUSE = 1.0, 5.0
+#: Largest number of values that a text lists one by one, and of series that a figure shows in panels. Chosen by trial.
+LISTED = 6
+
 
 class MdrDaskError(Exception):
     """Base of every error that mdr_dask raises on purpose."""

@@ -31,14 +31,12 @@ MOST_SHARED = 30 * OPERATIONS
 #: Blocks whose cases share work and that have fewer operations than `MOST_SHARED` are halved only if this multiplies
 #: the total number of operations by less than this factor.
 REPEATED_WORK = 1.15
-#: The operations of at most this number of blocks of a series are counted, so that `check` is fast.
+#: The operations of at most this number of blocks of a series are counted, so that `check` is fast. Chosen by trial.
 SAMPLED = 1000
 #: Largest number of records in one file. A file with this number of records has about a megabyte.
 RECORDS_TOGETHER = 1000
-#: Largest size of a chunk in bytes. A task needs memory for one chunk of each output.
+#: Largest size of a chunk in bytes. A task needs memory for one chunk of each output. Chosen by trial.
 CHUNK_BYTES = 64 * 2**20
-#: Largest number of results of a series. A larger number is taken to be a mistake in the campaign file.
-MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
 
@@ -238,10 +236,11 @@ def templates(
     problems = []
     for series in campaign.series:
         sizes = {**series.sizes, "realisation": realisations}
-        if math.prod(sizes.values()) > MOST_CASES:
+        needed, limit = 6.0 * math.prod(sizes.values()), available_memory()  # the ledger, and five masks of a round
+        if needed > limit:
             counts = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
             where = f"series.{series.name}" if series.name else "parameters"
-            problems.append(f"{campaign.source}: {where}: expected at most {MOST_CASES:.0e} results, got {counts}")
+            problems.append(f"{campaign.source}: {where}: {counts} results need {_too_much(needed, limit)}")
             continue
         outputs = _outputs(campaign, series, model)
         extra = model.coordinates(series.parameters)
@@ -274,10 +273,12 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
     limit = available_memory()
     if needed <= limit:
         return []
-    return [
-        f"{template.campaign.source}: one case needs about {needed / 2**30:.4g} GiB of memory, "
-        f"expected at most the {limit / 2**30:.4g} GiB of this machine (use fewer points or less oversampling)"
-    ]
+    what = _too_much(needed, limit)
+    return [f"{template.campaign.source}: one case needs {what} (use fewer points or less oversampling)"]
+
+
+def _too_much(needed: float, limit: float) -> str:
+    return f"about {needed / 2**30:.4g} GiB of memory, expected at most the {limit / 2**30:.4g} GiB of this machine"
 
 
 def available_memory() -> float:

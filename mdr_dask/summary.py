@@ -10,12 +10,10 @@ from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Refinement
 from mdr_dask.campaign.fields import yaml_text
 from mdr_dask.campaign.written import written_units
+from mdr_dask.errors import LISTED
 from mdr_dask.models.base import unit_of
 from mdr_dask.plan import Estimate, estimate
 from mdr_dask.units import seconds, shown
-
-#: An axis with at most this number of values is printed with all its values.
-LISTED = 6
 
 
 @dataclass(frozen=True, repr=False)
@@ -117,9 +115,9 @@ def spacing(values: tuple[float, ...]) -> str:
 
     numbers = np.asarray(values, dtype=np.float64)
     steps = np.diff(numbers)
-    if np.allclose(steps, steps[0], rtol=1e-6, atol=0):
+    if np.allclose(steps, steps[0], atol=0):
         return ", linear"
-    if np.all(numbers > 0) and np.allclose(np.diff(np.log(numbers)), np.log(numbers[1] / numbers[0]), rtol=1e-6):
+    if np.all(numbers > 0) and np.allclose(np.diff(np.log(numbers)), np.log(numbers[1] / numbers[0]), atol=0):
         return ", geometric"
     return ""
 

@@ -115,7 +115,7 @@ def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
 
 #: Errors that a fault of the machine may cause, such as a full disk or a missing library.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Largest number of characters of a stored message. Every failed result has a message.
+#: Largest number of characters of a stored message. Every failed result has a message. Chosen by trial.
 LONGEST_MESSAGE = 1000
 
 

@@ -19,8 +19,8 @@ from mdr_dask.store import files, locks
 #: Processes are forked from a server that has loaded all modules.
 PROCESSES = multiprocessing.get_context("forkserver")
 PROCESSES.set_forkserver_preload(["toy", "killed_parts", "zarr", "dask", "filelock", "mdr_dask.execute.rounds"])
-#: Shorter than the defaults, s: time between heartbeats in a bucket, and time after which a part counts as killed.
-BEAT, SILENCE = 0.5, 8.0
+#: Time between heartbeats in a bucket, s: shorter than the default.
+BEAT = 2.0
 
 
 def study(blocks: int):
@@ -33,7 +33,7 @@ def run_part(url: str, part: Part, blocks: int, pause: float, server: dict[str, 
     toy.install(pause)
     assert "toy" in models.NAMES
     if files.local(url) is None:
-        locks.BEAT, locks.SILENCE = BEAT, SILENCE
+        locks.BEAT = BEAT
     while True:
         with suppress(StoreBusyError):
             execute.run(study(blocks), url, Resources(threads=1), lambda _: None, part=part)

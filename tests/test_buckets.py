@@ -145,8 +145,7 @@ def test_a_run_ends_with_the_network_and_the_next_one_goes_on(toy, link, bucket,
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")  # those of the library below take more than a minute
     run(small(toy, 9), url)
     port, begun = link.target, []
-    monkeypatch.setattr(locks, "SILENCE", 0.5)
-    monkeypatch.setattr(locks, "BEAT", 0.2)
+    monkeypatch.setattr(locks, "BEAT", 0.25)
 
     def report(progress):
         if progress.blocks and not begun:
@@ -167,7 +166,7 @@ def test_a_run_ends_with_the_network_and_the_next_one_goes_on(toy, link, bucket,
 
 def test_a_server_that_does_not_answer_ends_a_run_in_one_sentence(toy, link, bucket, monkeypatch):
     run(small(toy), bucket)
-    monkeypatch.setattr(files, "LONGEST_REQUEST", 1.0)
+    monkeypatch.setattr(files, "BEAT", 0.25)
     link.delay = 30.0
     start = time.monotonic()
     with pytest.raises(StoreError, match="the server has not answered for 1 s"):

@@ -16,7 +16,7 @@ from test_execute import digests, run, values
 from mdr_dask import execute, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources, clusters
+from mdr_dask.execute import Resources
 
 
 @pytest.fixture
@@ -76,8 +76,10 @@ def test_a_task_of_another_version_is_refused_before_anything_is_written(toy, ur
 
 def test_a_scheduler_that_does_not_answer_is_named(toy, url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0]))
-    monkeypatch.setattr(clusters, "SCHEDULER_PATIENCE", 0.2)
-    with pytest.raises(ClusterError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "200 ms"}),
+        pytest.raises(ClusterError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"),
+    ):
         run_on(Resources(scheduler="tcp://127.0.0.1:9"), campaign, url)
     with pytest.raises(ClusterError, match="no Dask scheduler answers at 'head:node'"):
         run_on(Resources(scheduler="head:node"), campaign, url)

@@ -9,6 +9,7 @@ import time
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -55,8 +56,7 @@ def test_a_case_that_crashes_its_process_has_failed(example, options):
     done = example("run", "pin.yaml", "--quiet", *options, line=CRASH)
     assert (done.returncode, "36 done, 4 failed" in done.stdout) == (1, True), done.stderr
     told = example("status", "results/pin.zarr", "--failures", line=CRASH).stdout
-    assert "2 x failed: its process crashed: Segmentation fault" in told
-    assert "2 x failed: other realisations of this case crashed" in told
+    assert "4 x failed: its process crashed: Segmentation fault" in told
     assert example("verify", "results/pin.zarr").returncode == 0
     healed = example("run", "pin.yaml", "--quiet", "--retry-failed")
     assert (healed.returncode, "36 kept, 4 done, 0 failed" in healed.stdout) == (0, True)
@@ -204,11 +204,13 @@ def test_two_parts_that_were_computed_apart_are_joined_by_a_copy(toy, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["bomb", "encrypted", "compression", "outside"])
-def test_a_zip_of_a_stranger_is_refused_before_it_is_unpacked(tmp_path, capsys, kind):
+def test_a_zip_of_a_stranger_is_refused_before_it_is_unpacked(tmp_path, capsys, monkeypatch, kind):
+    if kind == "bomb":
+        monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=50))
     path = tmp_path / "x.zip"
     name = "../../evil.txt" if kind == "outside" else "zarr.json"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2 if kind == "compression" else zipfile.ZIP_DEFLATED) as packed:
-        packed.writestr(name, b"0" * (300 * 2**20 if kind == "bomb" else 10))
+        packed.writestr(name, b"0" * 10)
         packed.writestr("published/checksums.sha256", f"{'0' * 64}  {name}\n")
     if kind == "encrypted":
         content = bytearray(path.read_bytes())

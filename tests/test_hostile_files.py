@@ -23,7 +23,10 @@ HOSTILE = {
     "a null character": HEAD + 'parameters: {}\nstore: {path: "a\\0b"}\n',
     "an endless table": HEAD + "parameters: {}\nsampling: {table: /dev/zero}\n",
     "a series that ends like a leftover": HEAD + "parameters: {}\nseries: {x.partial: {}}\n",
-    "a series with a long name": HEAD + "parameters: {}\nseries: {" + "x" * 300 + ": {}}\n",
+    "a deep chain of aliases": HEAD
+    + "a0: &a0 [1]\n"
+    + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1, 3000))
+    + "parameters: {position: *a2999}\n",
 }
 
 

@@ -94,8 +94,7 @@ def test_of_many_that_want_a_study_at_once_one_gets_it(bucket):
 
 
 def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, bucket, monkeypatch, caplog):
-    monkeypatch.setattr(locks, "BEAT", 0.05)
-    monkeypatch.setattr(locks, "SILENCE", 2.0)
+    monkeypatch.setattr(locks, "BEAT", 1.0)
     caplog.set_level(logging.WARNING)
     run(small(toy), bucket)
     gone = {"owner": "a" * 32, "who": "process 1 on node7", "time": time.time() - 3.0}
@@ -171,7 +170,7 @@ def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypa
         order.append("next")
     thread.join()
     assert order == ["written", "next"]
-    monkeypatch.setattr(locks, "SILENCE", 0.1)
+    monkeypatch.setattr(locks, "BEAT", 0.05)
     path.write_bytes(survivor)
     with (
         store.while_locked(url, hold),

@@ -212,7 +212,7 @@ def test_a_run_in_a_notebook_moves_its_bar(monkeypatch):
     room.display = lambda html, display_id: SimpleNamespace(update=shown.append)
     monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
     monkeypatch.setitem(sys.modules, "IPython.display", room)
-    monkeypatch.setattr(bars, "LIVE_PAUSE", 0.02)
+    monkeypatch.setattr(bars, "LOOK", 0.02)
     with bars.reporter(quiet=False) as report:
         report(studies.execute.__globals__["Progress"](total=10, done=4))
         end = time.monotonic() + 20

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,15 +10,16 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import LISTED
 from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
-#: Number of digits to which the values of a range are rounded, to remove rounding errors.
-_DIGITS = 14
-#: Two values of an axis count as equal if they agree in this number of digits.
+#: Number of digits to which the values of a range are rounded: a double holds 15 digits, and the last digit may contain
+#: the rounding errors of `Spread.at`.
+_DIGITS = sys.float_info.dig - 1
+#: Two values of an axis count as equal if they agree in this number of digits, so that a study can be continued on a
+#: machine that rounds the 14th digit otherwise.
 SAME_DIGITS = 12
-#: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
-SOME = 64
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,9 @@ class Axis:
 
     @property
     def some(self) -> list[Any]:
-        """At most `SOME` values of the axis, evenly spread, including the first and the last."""
-        places = np.linspace(0, len(self.values) - 1, min(len(self.values), SOME)).round().astype(int)
-        return [self.values[place] for place in places]
+        """The values for checks and notes: all values or, of many numbers, the smallest and the largest."""
+        is_short = self.labels is not None or len(self.values) <= LISTED
+        return list(self.values) if is_short else [min(self.values), max(self.values)]
 
 
 @dataclass(frozen=True)

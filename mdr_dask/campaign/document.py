@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
@@ -18,11 +17,10 @@ from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
-_DEEPEST = 50  # largest number of nesting levels; a campaign has at most ten, and Python fails at about 1000
-_LARGEST = 200_000  # largest number of values in a file; with aliases, a short text can stand for billions of values
-_LONGEST = 300_000  # largest number of characters in a file; reading them takes about a second
-_TOO_DEEP = "too deeply nested, too many values, or an alias that contains itself"
-_MOST_DIGITS = 300  # largest number of digits of a number; a double has at most 309 before its decimal point
+#: Largest number of characters in a file, of values in a file (with aliases, a short text can stand for billions of
+#: values), and of values on an axis. Chosen by trial: reading so many characters takes about 20 s.
+LARGEST = 10**6
+TOO_DEEP = "too deeply nested, too many values, or an alias that contains itself"
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
 
@@ -48,6 +46,10 @@ class Document:
     def key_place(self, path: Path) -> Place:
         """Return the position of the key at a path. For an entry of a list, return the position of the entry."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
+
+    def last(self) -> Place:
+        """Return the position of the last value that was read."""
+        return self._at([*self._nodes.values()][-1]) if self._nodes else Place(self.source, 1, 1)
 
     def report(self, path: Path, what: str, key: bool = False) -> None:
         """Add a problem of the value at a path or, if `key` is true, of the key at this path."""
@@ -75,9 +77,9 @@ def parse(text: str, source: str) -> Document:
     """Parse a YAML 1.2 text. `source` is the name of the text in messages, for example the name of a file."""
     document = Document(source, text)
     problems = document.problems
-    if len(text) > _LONGEST:
+    if len(text) > LARGEST:
         what = (
-            f"expected at most {_LONGEST} characters, got {len(text)} (write many values as a range, or put "
+            f"expected at most {LARGEST} characters, got {len(text)} (write many values as a range, or put "
             "them into a table)"
         )
         problems.add(Place(source, 1, 1), "", what)
@@ -86,6 +88,10 @@ def parse(text: str, source: str) -> Document:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ReusedAnchorWarning)
             root = YAML(typ="safe", pure=True).compose(text)
+        if root is not None:
+            document.data = _Reader(document).read(root, ())
+    except RecursionError:
+        problems.add(document.last(), "", TOO_DEEP)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = ", ".join(part for part in (error.context, error.problem) if part)
@@ -94,12 +100,6 @@ def parse(text: str, source: str) -> Document:
         before = text[: error.position]
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
         problems.add(Place(source, line, column), "", f"not YAML: {str(error).splitlines()[0]}")
-    except RecursionError:
-        problems.add(Place(source, 1, 1), "", _TOO_DEEP)
-    else:
-        if root is not None:
-            with suppress(_EndlessError):
-                document.data = _Reader(document).read(root, ())
     return document
 
 
@@ -133,10 +133,6 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
     return second != first and second > 0
 
 
-class _EndlessError(Exception):
-    """The signal to stop reading a document that is too large or too deeply nested. The problem is already reported."""
-
-
 class _Reader:
     def __init__(self, document: Document) -> None:
         self.document = document
@@ -144,9 +140,8 @@ class _Reader:
 
     def read(self, node: Node, path: Path) -> Any:
         """Return the plain data of a node and remember its position."""
-        if len(path) > _DEEPEST or len(self.document._nodes) > _LARGEST:
-            self.problems.add(self.document._at(node), "", _TOO_DEEP)
-            raise _EndlessError
+        if len(self.document._nodes) > LARGEST:
+            raise RecursionError
         self.document._nodes[path] = node
         if isinstance(node, MappingNode):
             return self._mapping(node, path)
@@ -177,15 +172,18 @@ class _Reader:
             return None
         if kind == "bool":
             return text.casefold() == "true"
-        if len(text) > _MOST_DIGITS and kind in ("int", "float"):
-            self.document.report(path, f"expected a shorter number, got {len(text)} digits")
-            return None
         if _NO_TEXT.search(text):
             self.document.report(path, "expected text without null or damaged characters")
             return None
         digits = text.replace("_", "").casefold()
         if kind == "int":
-            return int(digits, 0 if digits.lstrip("+-")[:2] in ("0x", "0o", "0b") else 10)
+            try:
+                whole = int(digits, 0 if digits.lstrip("+-")[:2] in ("0x", "0o", "0b") else 10)
+                float(whole)
+            except (ValueError, OverflowError):
+                self.document.report(path, f"expected a shorter number, got {len(text)} digits")
+                return None
+            return whole
         if kind == "float":
             return float(digits.replace(".inf", "inf").replace(".nan", "nan"))
         if kind not in _KEPT_AS_TEXT:

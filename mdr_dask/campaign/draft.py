@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
+from mdr_dask.errors import LISTED
 from mdr_dask.models.base import Model, Parameters, describe, unit_of
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.units import is_unit, shown
@@ -35,8 +36,8 @@ realisations: 1                     # samples of each case, with different rando
 
 parameters:
 """
-#: `_COMMENTS`: column in which comments begin. `_LONGEST`: a default with more characters becomes ``[...]``.
-_COMMENTS, _LONGEST = 36, 60
+#: Column in which comments begin, as in `_HEAD`.
+_COMMENTS = 36
 _EXAMPLE_FILE = "table.csv"
 _BOUNDS = ("gt", "ge", "lt", "le")
 
@@ -124,7 +125,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
     if isinstance(default, int | float) and not isinstance(default, bool) and unit is not None:
         return shown(default, unit, 12)
     if default is not None:
-        return text if len(text := fields.yaml_text(default)) <= _LONGEST else "[...]"
+        return "[...]" if isinstance(default, tuple) and len(default) > LISTED else fields.yaml_text(default)
     if usual := fields.usual(info):
         return f"[{usual[0]}]" if fields.holds_list(info) else usual[0]
     if DataFile in kinds or info.annotation == tuple[NamedFile, ...]:

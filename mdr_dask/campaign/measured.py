@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask import models
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import SAME, FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
+from mdr_dask.campaign.document import LARGEST
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.data_file import DataFile
@@ -25,10 +26,6 @@ _ERROR = re.compile(
     r"(?<!\w)(?:(?:std?|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|sem?)(?!\w)"
     r"|[σ±]|\+ ?/?"
 )
-#: Largest size of a table of measured points, in characters. The table is stored with the study.
-LARGEST = 10**6
-#: Two values of a condition count as equal up to this relative difference.
-SAME = 1e-6
 #: The reason why the fit refuses a table with errors that are zero.
 ZERO = "the fit needs standard errors above 0: delete the column of errors, so that the fit estimates them"
 

@@ -9,14 +9,14 @@ from pydantic import ValidationError
 
 from mdr_dask import models
 from mdr_dask.campaign.definition import Campaign, Replication, Series
-from mdr_dask.campaign.document import Document, parse, read_text
+from mdr_dask.campaign.document import TOO_DEEP, Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.measured import require_readable
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
 from mdr_dask.campaign.tolerances import tolerances
-from mdr_dask.errors import DataError, ModelError, did_you_mean
+from mdr_dask.errors import CampaignError, DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Model
 from mdr_dask.units import to_si
 
@@ -32,6 +32,13 @@ def load(path: str | FilePath) -> Campaign:
 def loads(text: str, source: str, directory: str) -> Campaign:
     """Read a campaign from a YAML 1.2 text, called `source` in messages. Names of files are relative to `directory`."""
     document = parse(text, source)
+    try:
+        return _campaign(document, directory)
+    except RecursionError:
+        raise CampaignError(f"{document.last()}: {TOO_DEEP}") from None
+
+
+def _campaign(document: Document, directory: str) -> Campaign:
     if not isinstance(document.data, dict):
         if not document.problems:
             document.report(
@@ -67,8 +74,8 @@ def loads(text: str, source: str, directory: str) -> Campaign:
         accuracy=spec.accuracy,
         store=spec.store.path or f"results/{spec.name}.zarr",
         blocks=dict(spec.store.blocks),
-        text=text,
-        source=source,
+        text=document.text,
+        source=document.source,
         remarks=remarks,
         measured=measured,
     )

@@ -7,18 +7,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
+from mdr_dask.campaign.document import LARGEST
 from mdr_dask.models.base import Parameters, Whole, quantity
 from mdr_dask.models.data_file import NamedFile
-
-_LONGEST_NAME = 100  # file systems allow 255 bytes, and endings are added to the name
 
 
 def _usable_as_file_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) or name.endswith("."):
         raise ValueError(f"expected a file name of letters, digits, '-', '_' and '.', got {name!r}")
-    if len(name) > _LONGEST_NAME or name.endswith((".partial", ".json")):
-        what = f"at most {_LONGEST_NAME} characters" if len(name) > _LONGEST_NAME else "another ending"
-        raise ValueError(f"expected a file name with {what}, got {name[:60]!r}")
+    if name.endswith((".partial", ".json")):
+        raise ValueError(f"expected a file name with another ending, got {name!r}")
     return name
 
 
@@ -63,7 +61,7 @@ class SobolSpec(Parameters):
     """Cases drawn as a scrambled Sobol sequence."""
 
     sobol: Whole = Field(
-        ge=1, le=10**6, description="number of cases, drawn from the ranges as a scrambled Sobol sequence"
+        ge=1, le=LARGEST, description="number of cases, drawn from the ranges as a scrambled Sobol sequence"
     )
 
 
@@ -72,7 +70,7 @@ class LatinHypercubeSpec(Parameters):
 
     latin_hypercube: Whole = Field(
         ge=1,
-        le=10**6,
+        le=LARGEST,
         description="number n of cases, drawn as a Latin hypercube: one case in each of n intervals of every range",
     )
 

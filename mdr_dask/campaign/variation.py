@@ -9,19 +9,16 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from pydantic import BaseModel
 
+from mdr_dask.arrays import is_geometric
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.definition import Spread, tidy
-from mdr_dask.campaign.document import Document
+from mdr_dask.campaign.document import LARGEST, Document
 from mdr_dask.campaign.problems import Path, Place, dotted, shown
 from mdr_dask.units import expected, to_si
 
-#: Largest number of values on one axis. A larger number is taken to be a mistake in the file.
-MOST_VALUES = 10**6
 RANGES = ("linear", "geometric", "values", "adaptive")
 #: Number of values with which an adaptive axis begins: its ends, its middle and its quarter points.
 FIRST = 5
-#: An adaptive axis has a logarithmic scale if its ends are positive and their ratio exceeds this number.
-DECADE = 10.0
 
 
 @dataclass(frozen=True)
@@ -138,7 +135,7 @@ class _Search:
                 self._complain(at, f"expected [first, last], got {shown(ends)}", name)
             linear = self._spread(path, "linear", [*ends, FIRST], at)
             low, high = sorted((linear.low, linear.high))
-            spread = replace(linear, geometric=low > 0 and high > DECADE * low)
+            spread = replace(linear, geometric=is_geometric((low, high)))
             return Variation(path, origin, tuple(self._items(spread, [*ends, FIRST], at)), spread, name)
         except _MalformedError:
             return Variation(path, origin)
@@ -187,10 +184,10 @@ class _Search:
         name, count = at[:-1], content[2]
         if isinstance(count, str) and count.isascii() and count.isdigit():
             count = int(count)  # the file may contain "5" instead of 5
-        if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
+        if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= LARGEST:
             self._complain(
                 (*at, 2),
-                f"expected a whole number from 2 to {MOST_VALUES} as the number of values, got {shown(count)}",
+                f"expected a whole number from 2 to {LARGEST} as the number of values, got {shown(count)}",
                 name,
             )
         numbers = spaced(spread, count)

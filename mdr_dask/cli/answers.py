@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from mdr_dask.cli.options import tell
-from mdr_dask.cli.printing import ROUNDING, finite, print_aligned, print_left, titled, with_error
+from mdr_dask.cli.printing import finite, is_rounding, print_aligned, print_left, titled, with_error
 from mdr_dask.cli.writing import require_suffix, writing
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
 
 
 def _is_shown(errors: Sequence[float], means: Sequence[float]) -> bool:
-    return any(error > ROUNDING * abs(mean) for error, mean in zip(errors, means, strict=True))
+    return any(error > 0 and not is_rounding(error, mean) for error, mean in zip(errors, means, strict=True))
 
 
 def _write_text(answer: Table, form: str, stream: TextIO) -> None:

@@ -20,12 +20,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: The error of a mean counts as a rounding error if the error is below this fraction of the mean.
-ROUNDING = 1e-13
-#: `GAP`: number of spaces between two columns of a table. `NARROWEST`: least width of a table, in characters.
-GAP, NARROWEST = 2, 40
-#: Least width, in characters, to which a text in the last column is wrapped.
-WRAPPED = 30
+GAP = "  "
+#: Least width of a text that is wrapped, in characters. Chosen by trial.
+NARROWEST = 25
 UNKNOWN = "-"
 #: A space at which lines are not broken.
 _BLANK = "\N{NO-BREAK SPACE}"
@@ -106,8 +103,8 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
     wrapped = [_heading(title, max(map(len, column), default=0)) for title, column in zip(titles, cells, strict=True)]
     for heads in ([[title] for title in titles], wrapped):
         widths = [max(map(len, [*head, *column])) for head, column in zip(heads, cells, strict=True)]
-        needed = [*widths[:-1], min(widths[-1], WRAPPED) if _is_text(cells[-1]) else widths[-1]]
-        if sum(needed) + GAP * (len(needed) - 1) <= terminal_width():
+        needed = [*widths[:-1], min(widths[-1], NARROWEST) if _is_text(cells[-1]) else widths[-1]]
+        if sum(needed) + len(GAP) * (len(needed) - 1) <= terminal_width():
             _print_block(heads, cells, widths)
             return
     if len(cells[0]) == 1:
@@ -122,7 +119,7 @@ def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
     first, rest = list(range(keys)), list(range(keys, len(widths)))
     parts, part = [], list(first)
     for column in rest:
-        size = sum(widths[k] + GAP for k in part) + widths[column]
+        size = sum(widths[k] + len(GAP) for k in part) + widths[column]
         if size > terminal_width() and len(part) > keys:
             parts.append(part)
             part = list(first)
@@ -139,7 +136,7 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
             cell.ljust(width) if is_left else cell.rjust(width)
             for cell, width, is_left in zip(line, widths, left, strict=True)
         ]
-        before = "".join(cell + " " * GAP for cell in aligned[:-1])
+        before = "".join(cell + GAP for cell in aligned[:-1])
         click.echo(hanging(before, aligned[-1].rstrip()) if left[-1] else (before + aligned[-1]).rstrip())
 
 
@@ -149,8 +146,8 @@ def _is_text(column: Sequence[str]) -> bool:
 
 def hanging(before: str, text: str) -> str:
     """Join two texts. If the result is wrapped, all lines of the second text begin in the same column."""
-    width = max(terminal_width() - len(before), NARROWEST // 2)
-    if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
+    width = terminal_width() - len(before)
+    if len(text) <= width or width < NARROWEST:
         return (before + text).rstrip()
     lines = textwrap.wrap(text, width, break_on_hyphens=False)
     return ("\n" + " " * len(before)).join([before + lines[0], *lines[1:]]).rstrip()
@@ -238,12 +235,14 @@ def with_error(mean: float, *errors: float | None) -> str:
     """Join a mean and its errors. An unknown error becomes ``?``, and a rounding error becomes 0."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
-    shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]
+    known = [error if error is not None and math.isfinite(error) else None for error in errors]
+    shown = ["?" if each is None else "0" if is_rounding(each, mean) else _number(each, 1) for each in known]
     return " +- ".join([_number(mean, 4), *shown])
 
 
-def _error(error: float, size: float) -> str:
-    return _number(error, 1) if error > ROUNDING * size else "0"
+def is_rounding(error: float, mean: float) -> bool:
+    """Return whether the error of a mean is zero or a rounding error."""
+    return math.isclose(mean, mean + error)
 
 
 def _number(value: float, digits: int) -> str:

@@ -195,6 +195,7 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
     from mdr_dask import store as stores
     from mdr_dask.fits.interpolant import law as table_of
     from mdr_dask.questions import selection
+    from mdr_dask.units import shown
 
     require_suffix(path, (".nc", ".zarr"))
     dataset = selection.select(selection.group(stores.datasets(store), series), selections, tell)
@@ -205,7 +206,7 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
     for dim in values.dims:
         if values[dim].dtype.kind in "fiu":
             unit = str(values[dim].attrs.get("units", "1"))
-            low, high = (selection.written(values[dim].to_numpy()[end], unit) for end in (0, -1))
+            low, high = (shown(float(values[dim][end]), unit, 6) for end in (0, -1))
             click.echo(f"{dim}: {low} to {high}, {values.sizes[dim]} values")
     part = (error / abs(values)).where(values != 0)
     click.echo(f"{path}: error of {output} {float(part.median()):.1%} in the median, {float(part.max()):.1%} at most")

@@ -13,7 +13,6 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -26,19 +25,13 @@ from typing import Any
 import numpy as np
 
 from mdr_dask import models
-from mdr_dask.errors import MachineError
+from mdr_dask.errors import PAUSE, MachineError
 from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
 #: Code that the server process runs.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
 #: Environment variables that limit libraries for linear algebra to one thread when these libraries are imported.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: Time in s that a block may take in addition to the time limits of all its results, before its child process is
-#: killed. A case in plain Python normally raises TimeoutError earlier, at the time limit of the case.
-GRACE = 1.0
-#: If this number of realisations of a case have crashed, the other realisations of the case are marked as failed and
-#: are not computed.
-MOST_CRASHES = 2
 
 
 @dataclass(frozen=True)
@@ -56,13 +49,16 @@ class Child:
     server: subprocess.Popen[bytes]
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
-        """Compute a block in the child process, with at most `limit` seconds for each result."""
+        """Compute a block in the child process, with at most `limit` seconds for each result.
+
+        A case in plain Python raises TimeoutError at the limit. Other blocks are killed a little later.
+        """
         try:
             self.pipe.send((work, limit))
             begun = self.pipe.recv()
             if isinstance(begun, Crash):
                 return begun
-            if limit is not None and not self.pipe.poll(limit * np.count_nonzero(work.wanted) + GRACE):
+            if limit is not None and not self.pipe.poll(limit * np.count_nonzero(work.wanted) + PAUSE):
                 os.kill(begun, signal.SIGKILL)
                 self.pipe.recv()
                 return Crash(f"took longer than {limit:g} s")
@@ -108,25 +104,14 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
     again, down to single results. A single result that crashes the process is marked as failed.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
-    crashed: Counter[int] = Counter()
     while pieces:
         piece = replace(pieces.pop(), attempt=next(attempts))
-        flat = piece.wanted.reshape(work.block.cases, -1)
-        given_up = np.array([crashed[case] >= MOST_CRASHES for case in range(work.block.cases)])
-        failed = (flat & given_up[:, None]).reshape(piece.wanted.shape)
-        if failed.any():
-            others = piece.wanted & ~failed
-            pieces += [replace(piece, wanted=others)] * bool(others.any())
-            part = replace(piece, wanted=failed, spared=np.zeros_like(failed))
-            yield part, write_off(part, "other realisations of this case crashed")
-            continue
         reply = child.run(piece, limit)
         if isinstance(reply, Outcome):
             yield piece, reply
         elif halves := piece.halves():
             pieces += reversed(halves)
         else:
-            crashed[int(np.flatnonzero(flat.any(axis=1))[0])] += 1
             yield piece, write_off(piece, reply.why)
 
 

@@ -24,8 +24,6 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Time in s to wait for the first answer of a scheduler. A scheduler must import modules before the first answer.
-SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
 #: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time.
@@ -124,7 +122,7 @@ def _redirected(logger: logging.Logger, handler: logging.Handler) -> Iterator[No
 def _connected(address: str) -> Client:
     try:
         get_address_host_port(address)
-        return Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
+        return Client(address, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(f"no Dask scheduler answers at {address!r}: {str(error) or type(error).__name__}") from None
 

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Number of submitted blocks for each thread. While a thread computes one block, the next block is already waiting.
-AHEAD = 2
-
 
 class Executor(AbstractContextManager["Executor"]):
     """Compute blocks on the given resources.
@@ -84,7 +81,8 @@ class Executor(AbstractContextManager["Executor"]):
         running: set[Future[list[tuple[Work, Outcome]]]] = set()
         try:
             while True:
-                more = itertools.islice(remaining, AHEAD * self._threads - len(running))
+                # one more block than threads, so that no thread waits for a block
+                more = itertools.islice(remaining, self._threads + 1 - len(running))
                 running |= {pool.submit(self._compute, work) for work in more}
                 if not running:
                     break

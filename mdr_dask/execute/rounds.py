@@ -16,7 +16,7 @@ import numpy as np
 from mdr_dask import models, store
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
-from mdr_dask.errors import StoreError
+from mdr_dask.errors import LOOK, PAUSE, StoreError
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Progress, Tell, ended
 from mdr_dask.execute.executors import Executor
@@ -27,9 +27,6 @@ from mdr_dask.refinement import Stage
 from mdr_dask.replication import growth_needed, known_scatter, next_round
 from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
-
-#: Time in s between two checks (`LOOK`) of the progress of other parts, and between two messages about it (`PAUSE`).
-LOOK, PAUSE = 1.0, 4.0
 
 
 def run(

@@ -14,18 +14,12 @@ from distributed import Client, Future, KilledWorker, get_worker
 from distributed.client import ClosedClientError
 from distributed.comm import CommClosedError
 
-from mdr_dask.errors import ClusterError, ModelError
+from mdr_dask.errors import LOOK, PAUSE, ClusterError, ModelError
 from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.plan import BlockIndex
 from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
 
-#: Time in s between two checks of the cluster.
-CHECK_PAUSE = 1.0
-#: Time in s between two messages which say that the cluster has no worker.
-REPORT_PAUSE = 3.0
-#: Time in s to wait for an answer from the scheduler, or for the transfer of a result from a worker.
-ANSWER_LIMIT = 3.0
 #: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
@@ -72,7 +66,7 @@ class TaskWindow:
         suspects: set[tuple[str, BlockIndex]] = set()
 
         def fill() -> None:
-            free = 2 * max(self._threads, self._most) + 2 - len(self._running)
+            free = 2 * max(self._threads, self._most, 1) - len(self._running)
             for _, work in zip(range(free), remaining, strict=False):
                 self._submit(_run_apart if self._case_timeout else _run, work)
 
@@ -80,11 +74,11 @@ class TaskWindow:
             self._check()
             fill()
             while self._running:
-                if time.monotonic() - self._checked_at > CHECK_PAUSE:
+                if time.monotonic() - self._checked_at > LOOK:
                     self._check()
                     fill()
                 try:
-                    future = self._ended.get(timeout=CHECK_PAUSE)
+                    future = self._ended.get(timeout=LOOK)
                     outcomes = _outcomes(future)
                 except Empty:
                     continue
@@ -118,7 +112,7 @@ class TaskWindow:
         if self._replace_lost is not None:
             self._replace_lost()
         try:
-            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWER_LIMIT)
+            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=PAUSE)
             self._threads, what = sum(found.values()), "no worker"
         except TimeoutError:
             self._threads, what = 0, "no answer of the scheduler"
@@ -133,7 +127,7 @@ class TaskWindow:
         why = f" ({complaint})" if complaint else ""
         if waited > self._patience:
             raise ClusterError(f"{what} for {waited:.0f} s{why}; {KEPT}, if necessary with a larger --patience")
-        if now - self._reported_at >= REPORT_PAUSE:
+        if now - self._reported_at >= PAUSE:
             self._reported_at = now
             what = "all workers are gone" if self._had_workers and what == "no worker" else f"{what} yet"
             sentence = f"{what}, waiting for {waited:.0f} s{why}; giving up after {self._patience:.0f} s"
@@ -152,7 +146,7 @@ def _outcomes(future: Future) -> Outcomes | None:
     from concurrent.futures import CancelledError
 
     try:
-        outcomes: Outcomes = future.result(timeout=ANSWER_LIMIT)
+        outcomes: Outcomes = future.result(timeout=PAUSE)
     except KilledWorker:
         return None
     except CancelledError:

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, is_geometric
+from mdr_dask.bootstrap import RESAMPLES
 from mdr_dask.errors import FitError
 from mdr_dask.fits import calibration as fit
 from mdr_dask.fits import posterior
@@ -18,8 +19,6 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF, conditions
 
-#: Number of samples of the posterior distribution from which the band of predictions is computed.
-SAMPLES = 400
 Points = NDArray[np.intp]
 
 
@@ -35,7 +34,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     curves = _curves(found, main, data)
     x = Axis("measured point")
     if main:
-        x = Axis(labels.label(main, data[main]), labels.is_geometric(varied[main]), quantity=main)
+        x = Axis(labels.label(main, data[main]), is_geometric(varied[main]), quantity=main)
     panels = [_data(found, x, curves, data), _residuals(found, x, curves, data)]
     for k, name in enumerate(found.unknowns):
         panels.append(_density(found, name, found.values[:, k], labels.quantity(name, data[name]), k in found.free))
@@ -98,10 +97,10 @@ def _along(found: fit.Calibration, x: Axis, points: Points, data: xr.Dataset) ->
 
 def _data(found: fit.Calibration, x: Axis, curves: Mapping[str, Points], data: xr.Dataset) -> Panel:
     output, values = found.measured.output, found.measured.values
-    log = labels.is_geometric(values) and found.prediction.logarithmic
+    log = is_geometric(values) and found.prediction.logarithmic
     panel = Panel(x, Axis(labels.label(output, data[output]), log))
     how, half = labels.quantity(output, data[output]), HALF * found.noise[0]
-    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    steps = (np.arange(RESAMPLES) + 0.5) / RESAMPLES
     cells = np.searchsorted(np.cumsum(found.posterior.weights), steps).clip(0, len(found.posterior.weights) - 1)
     predicted = found.prediction(found.posterior.places[cells]).mean
     low, best, high = np.quantile(predicted, [0.025, 0.5, 0.975], axis=0)
@@ -156,7 +155,7 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
     height, back = density / density.max(), np.exp if log else np.asarray
     colour = "#909090" if is_free else colours.colour(1)
     x = Axis(labels.with_unit(how.symbol, how.unit), log)
-    panel = Panel(x, Axis("probability density", ticks=[(0.0, "0")], low=0.0, high=1.1))
+    panel = Panel(x, Axis("probability density", ticks=[(0.0, "0")], low=0.0))
     panel.traces.append(Trace("law", columns(x=back(centres), y=height), f"density of {name}", "", colour, "-"))
     if is_free:
         panel.title = "not determined"

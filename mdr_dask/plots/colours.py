@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mdr_dask.arrays import is_geometric
 from mdr_dask.plots import page
 from mdr_dask.plots.figure import Bar
-from mdr_dask.plots.labels import is_geometric
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize

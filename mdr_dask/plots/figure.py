@@ -16,6 +16,9 @@ from mdr_dask.plots.labels import plain
 #: Columns of the table of a figure: `FIRST` to the left of the columns of parameters, `LAST` to the right.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
+#: Number of points of a smooth line that is drawn from a formula. Chosen by trial: on paper, the points are less than a
+#: millimetre apart.
+SMOOTH = 400
 #: Entry of the column ``what`` for results of a study.
 DATA = "data"
 Kind = Literal["curve", "law", "band", "dots", "map", "absent"]

@@ -11,19 +11,18 @@ import xarray as xr
 
 from mdr_dask import aggregation
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError
+from mdr_dask.errors import LISTED, DataError
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.velocity_jump import VelocityJump
 from mdr_dask.plots import curves, labels
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
-from mdr_dask.plots.view import MOST_PANELS
+from mdr_dask.plots.figure import SMOOTH, Axis, Figure, Key, Mean, Panel, Trace, columns
 
 BEFORE, JUMP, AFTER = (f"friction_coefficient_{name}" for name in ("before", "jump", "after"))
 FRICTION = "friction_coefficient"
 TIME = "relaxation_times"
 DRIVEN = {"velocity": "m/s", "normal_force": "N"}
-#: Time span that is shown before the history begins, divided by the shown time span of the history.
+#: Time span that is shown before the history begins, divided by the shown time span of the history. Chosen by trial.
 LEAD = 0.08
 STEADY = "steady state at the end"
 
@@ -39,7 +38,7 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         raise DataError(f"expected a series with finished results of {', '.join(sorted(needed))}")
     families = {name: curves.family(data, FRICTION, TIME) for name, data in found.items()}
     kept, left_out = curves.with_one_legend(families)
-    rest, kept = kept[MOST_PANELS:], kept[:MOST_PANELS]
+    rest, kept = kept[LISTED:], kept[:LISTED]
     columns_of = {name: _column(name, found[name], families[name]) for name in kept}
     shown = [0, *(k for k in (1, 2) if any(_changes(column[k]) for column in columns_of.values()))]
     panels = [column[k] for column in columns_of.values() for k in shown]
@@ -79,7 +78,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
     panels[0].keys = [*one.keys, Key(STEADY, "#808080", ":")] if len(panels[0].traces) > 1 else one.keys
     for panel in panels[1:]:
         every = np.concatenate([trace.column("y") for trace in panel.traces])
-        panel.y = replace(panel.y, low=min(0.0, 1.1 * every.min()), high=1.15 * every.max())
+        panel.y = replace(panel.y, low=0.0 if every.min() >= 0 else None)
     return panels
 
 
@@ -108,7 +107,7 @@ def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatA
     found = [np.array([[-LEAD * last, 0.0], [speed, speed], [force, force]])]
     for part in parts:
         if part.start < last * unit:
-            count = 400 if part.swing[2] else 2
+            count = SMOOTH if part.swing[2] else 2
             time = np.linspace(part.start, min(part.end, last * unit), count)
             found.append(np.array([time / unit, *part.at(time)[1:]]))
     times, speeds, forces = np.concatenate(found, axis=1)

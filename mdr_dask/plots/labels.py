@@ -173,10 +173,3 @@ def short(number: float) -> str:
 def plain(text: str) -> str:
     """Return a label without mathtext, in one line: ``F_N = 1 N``."""
     return re.sub(r"[$\\]", "", text.replace("\\,", " ")).replace("#", "no. ").replace("\n", " ").strip()
-
-
-def is_geometric(values: Any) -> bool:
-    """Return whether numbers suit a logarithmic axis: all numbers are positive and span more than a factor of ten."""
-    values = np.asarray(values, dtype=np.float64)
-    values = values[np.isfinite(values)]
-    return bool(values.size and values.min() > 0 and values.max() > 10 * values.min())

@@ -15,6 +15,7 @@ from mdr_dask.fits.jumps import LAW, LEVELS, is_jump, jump_law
 from mdr_dask.models.ehl_line import groups
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 from mdr_dask.physics.sliding import laws
+from mdr_dask.plots.figure import SMOOTH
 
 #: Names of the outputs that some laws need as input.
 NEEDED = ("rms_slope", LEVELS[0])
@@ -64,7 +65,7 @@ def along(data: xr.Dataset, name: str) -> xr.Dataset:
     spread = np.geomspace if low > 0 else np.linspace
     held = data[[each for each in NEEDED if each in data]]
     fine: xr.Dataset = held.drop_vars(name, errors="ignore").assign_coords(
-        {name: (name, spread(low, high, 200), values.attrs)}
+        {name: (name, spread(low, high, SMOOTH), values.attrs)}
     )
     return fine
 

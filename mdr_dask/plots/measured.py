@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.measured import SAME, Measured, belonging, scatter
+from mdr_dask.arrays import SAME, FloatArray
+from mdr_dask.bootstrap import CONFIDENCE
+from mdr_dask.campaign.measured import Measured, belonging, scatter
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.calibration import measured_of, with_table
 from mdr_dask.plots import labels
@@ -19,7 +21,7 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
 #: Half width of a 95 % interval divided by the standard error.
-HALF = 1.96
+HALF = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
 NAME = "measured"
 
 

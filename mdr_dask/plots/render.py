@@ -21,9 +21,6 @@ from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Panel, Trace, edges
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Curves with at least this number of points are drawn without markers.
-MANY_POINTS = 60
-
 
 class Drawn(MplFigure):
     """A matplotlib figure that also holds its description as data. A notebook shows the figure as a picture."""
@@ -67,17 +64,17 @@ def render(description: Figure) -> Drawn:
     """Draw a figure with matplotlib and return the drawn figure."""
     panels, asked = description.panels, page.current()
     rows, columns = _grid(description)
-    width = asked.width or max(6.4, 4.2 * columns)
+    width = asked.width or mpl.rcParams["figure.figsize"][0] * (1 + columns) / 2
     height = rows * max(_least_height(), description.ratio * width / columns)
     figure = Drawn(description, figsize=(width, asked.height or height))
-    figure.set_layout_engine("constrained", w_pad=0.03, h_pad=0.03)
+    figure.set_layout_engine("constrained")
     places = _axes(figure, description, rows, columns)
     for axes, panel in zip(places, panels, strict=True):
         _draw_panel(axes, panel)
     _share_labels(places, panels)
     _bars(figure, places, panels)
     traces = [trace for panel in panels for trace in panel.traces]
-    markers = {trace.marker for trace in traces if not trace.line or trace.column("y").size < MANY_POINTS}
+    markers = {trace.marker for trace in traces}
     keys = list(dict.fromkeys(key for panel in panels for key in panel.entries()))
     keys = [key if key.marker in markers else replace(key, marker="") for key in keys]
     beside = _title(figure, description) + (_legend(figure, keys) if keys else 0.0)
@@ -180,8 +177,7 @@ def _log_ticks(axis: Any) -> None:
 def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
     x, y = trace.column("x"), trace.column("y")
     order = np.argsort(x, kind="stable") if trace.line and trace.kind == "curve" else np.arange(x.size)
-    marker = trace.marker if y.size < MANY_POINTS or not trace.line else ""
-    look: dict[str, Any] = {"color": trace.colour, "linestyle": trace.line or "none", "marker": marker}
+    look: dict[str, Any] = {"color": trace.colour, "linestyle": trace.line or "none", "marker": trace.marker}
     if trace.kind == "law":
         look["linewidth"] = 0.8 * mpl.rcParams["lines.linewidth"]
     axes.plot(x[order], y[order], gid=trace.kind, zorder=2 if trace.kind == "law" else 2.5, **look)
@@ -248,7 +244,7 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
             beside.setdefault(panel.bar, []).append(axes)
     for bar, where in beside.items():
         how, norm = colours.scale(bar)
-        drawn = figure.colorbar(ScalarMappable(norm, how), ax=where, aspect=30 if len(where) > 1 else 20)
+        drawn = figure.colorbar(ScalarMappable(norm, how), ax=where)
         drawn.set_label(bar.label)
         if bar.log:
             _log_ticks(drawn.ax.yaxis)
@@ -321,7 +317,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
         rest = len(keys) - len(kept)
         handles = [_handle(key) for key in kept]
         handles += [_handle(Key(f"and {rest} more, see the table", "none"))] if rest else []
-        for columns in range(min(len(handles), 6), 0, -1):
+        for columns in range(len(handles), 0, -1):
             legend = figure.legend(
                 handles=handles,
                 title=_broken(figure, title, 0.8 * width, size),

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from mdr_dask.arrays import SAME
+from mdr_dask.physics.surfaces.maps import ROUNDING
 from mdr_dask.plots import colours
-from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.plots.figure import SMOOTH, Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF
 
 if TYPE_CHECKING:
@@ -37,9 +39,9 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
         file, colour = xr.Dataset(coords={"file": Path(report.file.name).name}), colours.colour(k)
         areal.traces += _areal(report, used, colour, file)
         for (direction, (wave, cut)), (grey, dash) in zip(report.cuts.items(), CUTS, strict=False):
-            there, name = cut > 1e-20 * cut.max(), f"straight cut along {direction}"
+            there, name = cut > ROUNDING * cut.max(), f"straight cut along {direction}"
             line.traces.append(Trace("law", columns(file, x=wave[there], y=cut[there]), name, name, grey, dash))
-        wave = np.geomspace(used.wavenumber[0], used.wavenumber[-1], 400)
+        wave = np.geomspace(used.wavenumber[0], used.wavenumber[-1], SMOOTH)
         method = columns(file, x=wave, y=np.pi * wave * used.at(wave))
         line.traces.append(Trace("law", method, METHOD, METHOD, colour, "-"))
         name = f"{file['file'].item()}: measured (points) and used by a campaign (line)"
@@ -83,7 +85,7 @@ def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) ->
             for end, default in ((report.law.longest, bins.wavenumber[0]), (report.law.shortest, used.wavenumber[-1]))
         ]
     )
-    middle = (q >= along[0] * 0.999) & (q <= along[1] * 1.001)
+    middle = (q >= along[0] * (1 - SAME)) & (q <= along[1] * (1 + SAME))
     power = -2 - 2 * report.law.hurst.value
     level = np.exp(np.median(np.log(density[middle]) - power * np.log(q[middle])))
     law = columns(file, x=along, y=level * along**power)

@@ -11,14 +11,15 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.arrays import is_geometric
+from mdr_dask.errors import LISTED, DataError, did_you_mean
 from mdr_dask.models.base import Status
 from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: `MOST_PANELS`: largest number of panels for one output. `LONGEST_WORD`: most characters in a line of text at a tick.
-MOST_PANELS, LONGEST_WORD = 6, 20
+#: Largest number of characters in a line of text at a tick. Chosen by trial.
+LONGEST_WORD = 20
 #: `MARKS`: marks for cases without a value. `SOME`: mark for a case with failed realisations, because the mean may then
 #: be biased.
 MARKS = {
@@ -67,7 +68,7 @@ class View:
         """Return whether an axis is logarithmic. If `log` is None, an axis in degC is linear."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
-        return not how.offset and labels.is_geometric(values) if self.log is None else which in self.log and positive
+        return not how.offset and is_geometric(values) if self.log is None else which in self.log and positive
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
@@ -317,7 +318,7 @@ def _by_value(found: Series, view: View) -> tuple[list[Part], list[str]]:
     parts: dict[Any, Part] = {}
     left_out = []
     for name, data in found.items():
-        some, sentences = curves.thin(data, view.panels, MOST_PANELS)
+        some, sentences = curves.thin(data, view.panels, LISTED)
         left_out += sentences
         for k in range(some.sizes[view.panels]):
             part = some.isel({view.panels: k})
@@ -328,8 +329,8 @@ def _by_value(found: Series, view: View) -> tuple[list[Part], list[str]]:
 
 def _by_series(each: Mapping[str, T]) -> tuple[list[tuple[str, T]], list[str]]:
     names = list(each)
-    rest = [f"series {', '.join(names[MOST_PANELS:])}"] if len(names) > MOST_PANELS else []
-    return [(f"series {name}" if name else "", each[name]) for name in names[:MOST_PANELS]], rest
+    rest = [f"series {', '.join(names[LISTED:])}"] if len(names) > LISTED else []
+    return [(f"series {name}" if name else "", each[name]) for name in names[:LISTED]], rest
 
 
 def _panel(title: str, families: Sequence[curves.Family], view: View, output: str, x: Axis) -> Panel:
@@ -341,6 +342,7 @@ def _panel(title: str, families: Sequence[curves.Family], view: View, output: st
     marked: dict[str, str] = {}
     varying: dict[str, None] = {}
     every = [curve for one in families for curve in one.curves]
+    is_output = any(along in _own_dims(curve.data, output) for curve in every)
     several_styles = panel.bar or len({curve.line for curve in every}) > 1
     for curve in every:
         data = _counted(curve.data, output)
@@ -353,7 +355,8 @@ def _panel(title: str, families: Sequence[curves.Family], view: View, output: st
             panel.bar = colours.bar(labels.label(view.by, shades), np.concatenate(dots))
         else:
             points = columns(data, x=place, y=value)
-            look = {"colour": curve.colour, "line": curve.line, "marker": curve.marker}
+            marker = "" if is_output and curve.line else curve.marker
+            look = {"colour": curve.colour, "line": curve.line, "marker": marker}
             panel.traces.append(Trace("curve", points, label=curve.label, bars=not curve.line, **look))
         panel.traces += _absent(curve, place, output, marked)
         if curve.line and not several_styles and (law := laws.law_of(data, output)):
@@ -445,7 +448,7 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     figure.fixed = curves.fixed_text(curves.fixed_by_all(data for _, data, _ in drawn), drawn[0][1])
     half = np.concatenate([np.ravel(value.high - value.low) / 2 for _, _, value in drawn])
     unit = labels.printed_unit(labels.quantity(output, drawn[0][1][output]).unit)
-    if np.isfinite(half).any() and np.nanmax(half) > 1e-12 * np.nanmax(abs(every)):
+    if np.isfinite(half).any() and np.nanmax(half) > np.finfo(float).eps * np.nanmax(abs(every)):
         figure.bars = f"95 % intervals: at most ±{np.nanmax(half):.2g} {unit}".rstrip()
     figure.leave_out(left_out)
     return figure

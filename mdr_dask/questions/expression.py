@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from mdr_dask.arrays import SAME
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import conversion, dimension_of, is_unit
 
@@ -27,11 +28,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Numbers in conditions and selections count as equal up to this relative difference, because tables show six digits.
-SAME = 1e-5
 #: Dimension of a column with several words in each row. A comparison is true if it is true for any word of the row.
 ALTERNATIVES = "alternatives"
-_LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
 _PIECE = re.compile(r"\s*(\*\*|[*/^]|-?\d+|[^\W\d]\w*|[%°]\w*)")
 _KEYWORDS = {"and", "or", "not", "in", "is", "if", "else"}
@@ -85,8 +83,6 @@ class Expression:
 def parse(text: str) -> Expression:
     """Parse a condition or a formula. Raise DataError if the text is not a valid expression."""
     wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7'"
-    if len(text) > _LONGEST:
-        raise DataError(f"{wanted}, got {len(text)} characters")
     marked, quantities = _without_units(text)
     try:
         tree = ast.parse(marked.strip(), mode="eval").body
@@ -100,8 +96,11 @@ def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> V
 
     `find` returns a column with its unit in ``attrs["units"]``, or None if there is no column of this name.
     """
-    with np.errstate(all="ignore"):
-        return _Evaluation(expression, find, known).value(expression.tree)
+    try:
+        with np.errstate(all="ignore"):
+            return _Evaluation(expression, find, known).value(expression.tree)
+    except RecursionError:
+        raise DataError(f"expected a shorter expression, got {len(expression.text)} characters") from None
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:

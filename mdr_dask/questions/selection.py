@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask.arrays import SAME
 from mdr_dask.campaign.written import written_units
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import LISTED, DataError, did_you_mean
 from mdr_dask.models.base import Status
 from mdr_dask.questions.columns import Columns, fixed_words, inner
-from mdr_dask.questions.expression import SAME
 from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
@@ -98,13 +98,6 @@ def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None)
     if tell and not names and (others := [name for name in known if name not in {*kept, *all_errors}]):
         tell(f"left out, because they have further dimensions: {', '.join(others)} (name an output to include it)")
     return dataset[list(dict.fromkeys([*kept, *(error for error in errors if error in known)]))]
-
-
-def written(value: Any, unit: str | None, digits: int = 6) -> str:
-    """Return a value and its unit as text, in the form that a selection reads."""
-    if not isinstance(value, int | float | np.number):
-        return str(value)
-    return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
 
 
 def _parsed(text: str) -> tuple[str, str]:
@@ -235,6 +228,6 @@ def _extent(values: NDArray[Any], text: Callable[[float], str]) -> str:
     """Return a text about the values of an axis, for error messages."""
     if values.size == 1:
         return f"its only value is {text(values[0])}"
-    if values.size <= 6:
+    if values.size <= LISTED:
         return f"its values are {', '.join(map(text, values))}"
     return f"its values go from {text(values.min())} to {text(values.max())}"

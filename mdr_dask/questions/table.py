@@ -29,10 +29,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: `ROWS`: largest number of rows computed together. `WHOLE`: largest size in bytes of a study that is read as a whole.
-ROWS, WHOLE = 2**16, 2**26
-#: Largest size in bytes of a piece of a labelled array. The pieces are computed in parallel.
-PIECE = 2**20
+#: Largest number of rows computed together. Chosen by trial: larger tables take more memory and are no faster.
+ROWS = 2**16
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,8 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)], tell)
     used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])
     data = select(dataset[list(dict.fromkeys([*shown.data_vars, *used, STATUS]))], question.selections, tell)
-    data = _in_pieces(data)
+    # lazy pieces, each with all realisations of its cases
+    data = data.chunk({dim: -1 if dim == "realisation" else "auto" for dim in data.sizes})
     if question.group_by:
         kept = Columns(data).truth(question.where) if question.where else None
         data = averaged(data, question.group_by, kept)
@@ -120,14 +119,6 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
         found = aggregate(data[[*shown.data_vars]], question.statistics).assign({COUNTS: states})
         found = found.assign({CASES: data[CASES]} if CASES in data else {})
     return in_units(found.assign(numbers), question.units)
-
-
-def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
-    """Divide arrays into small lazy pieces, each with all realisations of its cases."""
-    import dask
-
-    with dask.config.set({"array.chunk-size": PIECE}):
-        return dataset.chunk({dim: -1 if dim == "realisation" else "auto" for dim in dataset.sizes})
 
 
 class _Maker:
@@ -188,7 +179,7 @@ class _Maker:
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
         """Yield the rows of each box that meet the condition: their positions among all rows, and their data."""
-        if whole and data.nbytes <= WHOLE:
+        if whole and not data.chunks:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
         before = 0

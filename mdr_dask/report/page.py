@@ -21,7 +21,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation, fits, models, plots, store
-from mdr_dask.errors import DataError, FitError, ModelError
+from mdr_dask.errors import LISTED, DataError, FitError, ModelError
 from mdr_dask.plots import curves
 from mdr_dask.plots.base import provenance
 from mdr_dask.plots.labels import plain
@@ -33,12 +33,9 @@ from mdr_dask.report.papers import SOURCES
 from mdr_dask.units import seconds, shown
 from mdr_dask.version import __version__
 
-#: Largest number of cases of one series that are drawn. The laws of a larger study are not fitted.
+#: Largest number of cases of one series that are drawn. The laws of a larger study are not fitted. Chosen by trial: a
+#: page takes minutes.
 MOST_CASES = 4000
-#: Largest number of rows of the table of a law.
-MOST_ROWS = 60
-#: Largest number of values of an axis that are listed.
-LISTED = 6
 #: Width of the figures: two columns of a journal, which fit on paper without scaling.
 SIZE = "170mm"
 _DECIMALS = re.compile(r"(\.\d\d)\d+")
@@ -214,12 +211,11 @@ def _law(title: str, result: xr.Dataset, command: str) -> Table:
     frame = frame.dropna(how="all", subset=numbers) if numbers else frame
     rows = [
         [*(_cell(row[dim]) for dim in dims), *(_interval(row, name) for name in constants)]
-        for row in frame.head(MOST_ROWS).to_dict("records")
+        for row in frame.to_dict("records")
     ]
     units = {name: str(result[name].attrs.get("units", "1")) for name in constants}
     headings = [*dims, *(name if unit in ("1", "") else f"{name} [{unit}]" for name, unit in units.items())]
-    more = f"{len(frame) - MOST_ROWS} more rows; " if len(frame) > MOST_ROWS else ""
-    return Table(title, headings, rows, f"{more}{command}")
+    return Table(title, headings, rows, command)
 
 
 def _interval(row: Mapping[Any, Any], name: str) -> str:

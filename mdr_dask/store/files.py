@@ -32,12 +32,10 @@ CLAIMS = ".claims/"
 RECORD_FOLDER = ".layout"
 #: Files and folders that a store may contain if its first run was stopped before it created the arrays.
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
-#: Number of simultaneous requests to a server. With fewer requests, a run would often wait for the answers.
-AT_ONCE = 64
-#: Time in s after which a request fails if the server has not answered.
-LONGEST_REQUEST = 120.0
-#: Number of threads that flush files to the disk. A block has about ten files.
-FLUSHERS = 8
+#: Time in s between two heartbeats of a run with a claim (`mdr_dask.store.locks`). After 4 times this time, a run
+#: without a heartbeat counts as ended, and a request to a server without an answer fails. Chosen by trial: a server may
+#: answer late, and the clocks of two machines may differ by some seconds.
+BEAT = 20.0
 #: Version of the layout. Stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
 
@@ -50,9 +48,9 @@ def local(url: str) -> Path | None:
 
 async def _answered(request: Awaitable[T]) -> T:
     try:
-        return await asyncio.wait_for(request, LONGEST_REQUEST)
+        return await asyncio.wait_for(request, 4 * BEAT)
     except TimeoutError:
-        raise TimeoutError(f"the server has not answered for {LONGEST_REQUEST:g} s") from None
+        raise TimeoutError(f"the server has not answered for {4 * BEAT:g} s") from None
 
 
 class _RemoteStore(zarr.storage.FsspecStore):
@@ -137,8 +135,8 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
     async def gather(names: tuple[str, ...]) -> list[Any]:
         return await asyncio.gather(*[bytes_of(url).get(name, default_buffer_prototype()) for name in names])
 
-    remaining = iter(files)
-    while window := tuple(itertools.islice(remaining, AT_ONCE)):
+    remaining, together = iter(files), zarr.config.get("async.concurrency")
+    while window := tuple(itertools.islice(remaining, together)):
         with guarded(url, f"reading {window[0]} and others"):
             found = sync(gather(window))
         yield from (
@@ -225,7 +223,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    with ThreadPoolExecutor(FLUSHERS) as pool:
+    with ThreadPoolExecutor() as pool:
         list(pool.map(flush, paths))
 
 

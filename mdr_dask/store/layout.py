@@ -39,6 +39,7 @@ from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
 #: Number of values in a chunk of a coordinate. With this large number, nearly every axis has a single chunk.
+#: Chosen by trial; an axis can grow during reading, because all its chunks have the same length.
 _COORDINATE_CHUNK = 4096
 #: Packages whose versions are written to the store.
 PACKAGES = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")

@@ -21,9 +21,6 @@ from mdr_dask.store.integrity import RECORD
 from mdr_dask.store.layout import layout_faults
 from mdr_dask.store.study import array_of, document
 
-#: Largest number of faults that a message names. `verify` names all faults.
-NAMED = 3
-
 
 @dataclass(frozen=True)
 class Blocks:
@@ -107,13 +104,14 @@ def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> 
     The values are not read. If `to_run` is true, missing files of the layout are no fault, because the run writes
     missing files again.
     """
-    faults = _faults(url, series, to_run)
-    if any(faults):  # check again: a run may have changed a file meanwhile
-        first = list(itertools.islice(_faults(url, series, to_run), NAMED + 1))
+    if any(_faults(url, series, to_run)):  # check again: a run may have changed a file meanwhile
+        first = next(_faults(url, series, to_run), None)
         if first:
-            more = ", and more" if len(first) > NAMED else ""
-            remedy = f"'mdr-dask verify --repair {url}' removes what is damaged, and the next run writes it again"
-            raise StoreError(f"{url}: damaged: {'; '.join(first[:NAMED])}{more}; {remedy}")
+            remedy = (
+                f"'mdr-dask verify {url}' names all faults; with --repair it removes what is damaged, and the next run "
+                "writes it again"
+            )
+            raise StoreError(f"{url}: damaged: {first}; {remedy}")
 
 
 def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:

@@ -25,8 +25,9 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
-from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.errors import LOOK, PAUSE, StoreBusyError, StoreError
 from mdr_dask.store.files import (
+    BEAT,
     CLAIMS,
     conditional,
     create,
@@ -45,16 +46,8 @@ try:
 except ImportError:  # runs then create claims instead of locks
     fcntl = None  # type: ignore[assignment]
 
-#: `BEAT`: time in s between two heartbeats of a run with a claim. `SILENCE`: time in s without a heartbeat after
-#: which the run counts as ended; much longer than `BEAT`, because the clocks of two machines may differ.
-BEAT = 10.0
-SILENCE = 60.0
-#: Time in s for which a process tries to acquire a lock. Several attempts are needed, because a process that only
-#: checks whether the lock is held also holds the lock for an instant.
-GLANCE = 0.5
-#: `POLL`: time in s between two attempts to acquire a lock. If a process waits for the gate for more
-#: than `PATIENCE` s, it logs a message.
-POLL, PATIENCE = 0.05, 4.0
+#: Time in s between two attempts to acquire a lock. Chosen by trial.
+POLL = 0.05
 #: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
@@ -152,7 +145,7 @@ def gate(url: str) -> Iterator[None]:
                 held.enter_context(acquire(url, _GATE))
                 break
             except StoreBusyError as error:
-                if time.monotonic() - start > PATIENCE and not is_reported:
+                if time.monotonic() - start > PAUSE and not is_reported:
                     log.warning("%s; waiting until it releases the store", error.args[0].partition(";")[0])
                     is_reported = True
                 time.sleep(POLL)
@@ -250,8 +243,11 @@ def _lock_file(url: str, name: str = "") -> Path:
 
 
 def _locked(file: Path) -> int:
-    """Lock a lock file and return the descriptor. If another process deletes the file, create the file again."""
-    give_up = time.monotonic() + GLANCE
+    """Lock a lock file and return the descriptor. If another process deletes the file, create the file again.
+
+    Another process may hold the lock for an instant, to check whether the lock is held.
+    """
+    give_up = time.monotonic() + LOOK
     while True:
         if not file.parent.exists():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -361,7 +357,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 def _retire(url: str, name: str) -> None:
     """Remove the runner files of a lock. Before this, wait until tasks that have locked these files finish writing."""
-    give_up = time.monotonic() + SILENCE
+    give_up = time.monotonic() + 2 * BEAT
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
             while True:
@@ -433,7 +429,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
     """Return whether the owner of a claim has recently written a heartbeat, or writes one while this function waits."""
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _claim(name, number, "life")) or claim
-    if time.time() - last.get("time", 0.0) <= SILENCE:
+    if time.time() - last.get("time", 0.0) <= 2 * BEAT:
         return True
     if not claim and read_bytes(url, _claim(name, number)) is None:
         return True  # the owner has just ended, and another run may have started

@@ -22,7 +22,8 @@ from mdr_dask.store.study import series_names
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Groups with more than this number of bytes are read through Dask, because large groups may not fit into memory.
+#: Groups with more than this number of bytes are read through Dask, because they may not fit into memory. Chosen by
+#: trial.
 LAZY_BYTES = 2**30
 
 

@@ -37,7 +37,7 @@ def test_points_have_the_colour_of_their_curve_and_their_error_bars(groups, tmp_
     rows = figure.table().query("what == 'measured'")
     np.testing.assert_allclose(rows.y, [2e-3, 5e-3])
     np.testing.assert_allclose(rows.x, [1e-3, 0.1] if "[m/s]" in panel.x.label else [1, 100])
-    np.testing.assert_allclose(rows.y_high - rows.y, [1.96e-4, 3.92e-4])
+    np.testing.assert_allclose(rows.y_high - rows.y, [1.96e-4, 3.92e-4], rtol=1e-4)
     assert "measured, 95 %" in [key.label for key in panel.keys]
 
 

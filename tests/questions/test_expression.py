@@ -79,7 +79,7 @@ REFUSED = [
     ("velocity ** velocity > 1", "expected + - * / **"),
     ("", "expected a condition such as"),
     ("(" * 300, "expected a condition such as"),
-    ("1" * 501, "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7', got 501 characters"),
+    ("1 + " * 900 + "velocity > 1", "expected a shorter expression, got 3612 characters"),
     ("__import__('os').system('true')", "expected + - * / **"),
     ("velocity.__class__ == 1", "no column"),
     ("(lambda: 1)()", "expected + - * / **"),

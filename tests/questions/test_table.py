@@ -4,6 +4,7 @@ import itertools
 import json
 import warnings
 
+import dask
 import numpy as np
 import pandas as pd
 import pytest
@@ -152,11 +153,11 @@ def test_orders_put_what_is_not_there_last(study, limit, most, monkeypatch):
     assert found["velocity"][3] == 1.0
 
 
-def test_arrays_are_made_piece_by_piece(study, monkeypatch):
+def test_arrays_are_made_piece_by_piece(study):
     question = Question(columns=("load_number",), outputs=("friction_coefficient",), where="velocity < 0.5")
     plain = labelled(study, question)
-    monkeypatch.setattr("mdr_dask.questions.table.PIECE", 64)
-    lazy = labelled(study, question)
+    with dask.config.set({"array.chunk-size": 64}):
+        lazy = labelled(study, question)
     assert lazy.friction_coefficient_mean.data.npartitions > 2
     assert all(array.chunks for array in lazy.filter_by_attrs(units="1").data_vars.values() if array.ndim > 1)
     xr.testing.assert_identical(lazy.compute(), plain.compute())
@@ -225,7 +226,6 @@ def test_boxes_follow_the_rows_whatever_their_size(study, most, monkeypatch):
     np.testing.assert_array_equal(np.concatenate(cut), np.arange(60))
     assert max(map(len, cut)) <= most
     monkeypatch.setattr(room, "ROWS", most)
-    monkeypatch.setattr(room, "WHOLE", 0)
     pd.testing.assert_frame_equal(rows(study, limit=4).iloc[:4], rows(study.chunk(velocity=2)).iloc[:4])
 
 
