@@ -25,7 +25,7 @@ from mdr_dask.models.fretting_wear.reduction import (
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
 from mdr_dask.physics.wear import rules
-from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.exact import COARSEST, exact
 from mdr_dask.physics.wear.exact import operations as exact_operations
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn, virgin_load
@@ -35,9 +35,7 @@ _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border"
 #: For each output that has another name in `Worn`, the name in `Worn`. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force", "worn_profile": "height", "worn_image": "image"}
-#: Two tolerances for the error of the worn profile, divided by eta d0: the tolerance if the campaign states no
-#: accuracy, and the smallest tolerance of any solution.
-_USUAL, _FINEST = 1e-3, 1e-5
+_FINEST = 1e-5  # smallest tolerance for the error of the worn profile, divided by eta d0; limited by rounding
 #: The tolerance of the first solution is this factor times the accuracy. If the first solution misses the accuracy,
 #: the tolerance of each further solution is this factor times the tolerance of the solution before.
 _FINER = 0.25
@@ -312,7 +310,7 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 def _first_resolution(accuracy: float | None) -> float:
     """Return the tolerance of the first solution: the allowed error of the worn profile, divided by eta d0."""
-    return _USUAL if accuracy is None else max(_FINER * accuracy, _FINEST)
+    return COARSEST if accuracy is None else max(_FINER * accuracy, _FINEST)
 
 
 def _contacts(
