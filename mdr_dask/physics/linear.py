@@ -13,7 +13,8 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from mdr_dask.arrays import FloatArray
 
-SLOWEST = 0.5  # Newton's method reuses a Jacobian while each step is smaller than this fraction of the previous step
+#: Newton's method reuses a Jacobian while each step is at most this fraction of the previous step; chosen by trial.
+SLOWEST = 0.5
 
 
 class Factors(NamedTuple):

@@ -21,7 +21,7 @@ from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import CLOSE, EPS, MOST_ITERATIONS
 
-_FILM_SHARE = 0.8  # one Newton step may reduce the film at a node by at most this fraction
+_FILM_SHARE = 0.8  # one Newton step may reduce the film at a node by at most this fraction; chosen by trial
 
 
 class Grid(NamedTuple):
