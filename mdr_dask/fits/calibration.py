@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import gammaincinv
+from scipy.special import chdtri
 
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter
@@ -23,8 +23,6 @@ from mdr_dask.fits.base import DOUBTFUL, Fit
 from mdr_dask.fits.interpolation import FEWEST
 from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.fits.posterior import (
-    CUT,
-    DEVIATIONS,
     OPEN,
     Noise,
     Posterior,
@@ -43,10 +41,11 @@ from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
-#: Smallest possible measurement error, as a fraction of the rms residual of the best prediction.
-LEAST = 0.2
+#: Smallest possible measurement error, as a fraction of the rms residual of the best prediction, and number of possible
+#: sizes. Chosen by trial: the scatter of the lines may cause most of the residual.
+LEAST, DEVIATIONS = 0.2, 14
 #: Smallest rms residual, as a fraction of the rms measured value. Smaller residuals may be due to rounding.
-_ROUNDING = 1e-9
+_ROUNDING = float(np.sqrt(np.finfo(float).eps))
 
 
 @dataclass(frozen=True)
@@ -204,11 +203,9 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the measurement error, from the rms `residual` of the best prediction.
 
-    The true error exceeds the largest size with a probability of 0.1 %. This probability is larger if the largest size
-    is reduced to the limit of 100 times `residual`.
+    The true error exceeds the largest size with a probability of 0.1 %.
     """
-    spare = max(1, count - unknowns)
-    most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
+    most = float(np.sqrt(count / chdtri(max(1, count - unknowns), 0.999)))
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
 
 
@@ -321,7 +318,7 @@ def sentence(found: Calibration) -> str:
     )
     free = [found.unknowns[k] for k in found.free]
     if not free:
-        return f"{start}every unknown is determined{_cut(found)}"
+        return f"{start}every unknown is determined"
     known = [name for name in found.unknowns if name not in free]
     for product in found.products:
         name, unit = found.name_and_unit(product)
@@ -333,21 +330,9 @@ def sentence(found: Calibration) -> str:
     if bound:
         side, end = ("below", bound["_low"]) if found.ends[found.free[0], 1] else ("above", bound["_high"])
         at = shown(end, found.units[free[0]])
-        return f"{start}{only}{free[0]} is only bounded from {side}, at {at}{_cut(found)}"
+        return f"{start}{only}{free[0]} is only bounded from {side}, at {at}"
     no_number = f"no number is given for {' and '.join(free)}"
-    return f"{start}{only or 'nothing is determined within the ranges of the study; '}{no_number}{_cut(found)}"
-
-
-def _cut(found: Calibration) -> str:
-    """Return a text that names the determined unknowns whose axis cuts off the interval (`CUT`)."""
-    is_high = at_ends(found.posterior) > -CUT
-    cut = [
-        f"{name} at {shown(float(axis[end]), found.units[name])}"
-        for k, (name, axis) in enumerate(found.prediction.unknowns.items())
-        for end in (0, -1)
-        if k not in found.free and is_high[k, end]
-    ]
-    return f"; the axis cuts off the interval of {' and '.join(cut)}: widen the axis" if cut else ""
+    return f"{start}{only or 'nothing is determined within the ranges of the study; '}{no_number}"
 
 
 FITS: tuple[Fit, ...] = (

@@ -11,11 +11,6 @@ from scipy.special import chdtrc, fdtrc
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
 
-#: A trend of the residuals counts against the model if chance causes such a trend with a probability below this value.
-TREND = 0.005
-#: Least number of points whose residuals can show a trend.
-FEWEST = 6
-
 
 class Residuals(NamedTuple):
     """Residuals of the best prediction.
@@ -56,10 +51,10 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
         if residuals.chance < DOUBTFUL:
             return f"no: the errors do not explain the residuals {about}"
         return hidden if residuals.errors > APPROXIMATE else f"yes: the errors explain the residuals {about}"
-    if residuals.scaled.size < FEWEST:
-        return f"not tested: {residuals.scaled.size} points without known errors are too few; {size}"
     probability, along = trend(residuals.scaled, conditions)
-    if probability < TREND and residuals.relative > WITHIN:
+    if np.isnan(probability) or residuals.freedom < 4:  # a trend is a parabola with three constants
+        return f"not tested: {residuals.scaled.size} points without known errors are too few; {size}"
+    if probability < DOUBTFUL and residuals.relative > WITHIN:
         return f"no: the residuals have a trend along {along} (by chance with probability {probability:.1g}); {size}"
     if residuals.errors > APPROXIMATE:
         return hidden
@@ -71,18 +66,17 @@ def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[flo
 
     For each condition, a parabola is fitted to the residuals against the rank of the condition's value.
     The smallest probability is multiplied by the number of conditions, because every condition is another chance to
-    find a trend.
+    find a trend. The result is NaN if every condition has fewer than four values.
     """
-    worst, along = 1.0, ""
+    found = []
     for name, values in conditions.items():
-        if np.unique(values).size < 4:
+        if np.unique(values).size < 4:  # a parabola through three values leaves no residuals
             continue
         rank = np.searchsorted(np.unique(values), values)
         terms = np.vander(rank / rank.max() - 0.5, 3)
         left = scaled - terms @ np.linalg.lstsq(terms, scaled)[0]
         spare = scaled.size - 3
-        share = (np.sum(scaled**2) - np.sum(left**2)) / 2 / max(np.sum(left**2) / spare, 1e-30)
-        probability = float(fdtrc(2, spare, max(share, 0.0)))
-        if probability < worst:
-            worst, along = probability, name
-    return min(1.0, worst * max(1, len(conditions))), along
+        share = (np.sum(scaled**2) - np.sum(left**2)) / 2 / max(np.sum(left**2) / spare, np.finfo(float).tiny)
+        found.append((float(fdtrc(2, spare, max(share, 0.0))), name))
+    worst, along = min(found, default=(np.nan, ""))
+    return float(np.minimum(1.0, worst * len(conditions))), along

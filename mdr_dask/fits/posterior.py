@@ -12,41 +12,33 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.bootstrap import CONFIDENCE
+from mdr_dask.fits.base import APPROXIMATE
 from mdr_dask.fits.prediction import Predicted, Prediction
 
-#: Number of cells along each unknown before refinement. The keys are the numbers of unknowns.
-START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: `BEST`: a refinement divides at least this number of cells; the keys are the numbers of unknowns. `MOST`: largest
-#: number of cells after a refinement.
-BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
+#: Number of cells before refinement, and smallest number of cells that a refinement divides. Chosen by trial: with
+#: fewer cells, a refinement may miss a narrow maximum.
+CELLS = 1024
+#: Largest number of cells after a refinement; limits the time.
+MOST = 160_000
 #: Cells are left out if ln(density) is below its maximum by more than this value. The total probability of these cells
 #: is below 1e-5.
 REACH = 14.0
 #: Refinement ends when the variation of ln(density) within a divided cell is less than this value, as a mean over the
-#: divided cells with their probabilities as weights.
+#: divided cells with their probabilities as weights. Chosen by trial.
 SMOOTH = 0.6
-#: Largest number of refinements.
-REFINEMENTS = 16
-#: Number of possible sizes of an unknown measurement error.
-DEVIATIONS = 14
-#: An end of the axis of an unknown is *open* if ln(largest posterior density / density at the end) is less than `OPEN`.
-#: For a normal density, an open end lies within two standard errors of the maximum.
-OPEN = 2.0
-#: The axis cuts off the 95 % interval of an unknown if the density at an end of the axis exceeds 5 % of the maximum.
-CUT = float(np.log(20))
-#: An unknown without an open end is undetermined if unknowns with an open end explain more than this share of its
-#: variance.
-LINKED = 0.25
+#: An end of the axis of an unknown is *open* if ln(largest posterior density / density at the end) is less than `OPEN`:
+#: the 95 % interval by the ratio of likelihoods reaches this end.
+OPEN = float(chdtri(1, 1 - CONFIDENCE)) / 2
 #: The data determine a product if the spread of its logarithm is less than this fraction of the spread in the prior.
+#: Chosen by trial.
 NARROW = 0.25
-#: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
-#: at most this factor.
-ROUNDED = 1.15
 #: Probability of each interval. A key is the text that follows ``_low`` and ``_high`` in the names of the ends, such as
 #: ``_68`` in ``x_low_68``.
-LEVELS = {"": 0.95, "_68": 0.6827}
+LEVELS = {"": CONFIDENCE, "_68": 0.6827}
 #: `ENDS`: suffixes of the median and of the ends of the intervals. `SHARES`: cumulative probabilities of the median and
 #: of the ends.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
@@ -130,13 +122,14 @@ class Posterior(NamedTuple):
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
     """Return the posterior density on cells of the unit cube, from the result of `likelihood` and a uniform prior."""
-    width = 1.0 / START[unknowns]
-    axis = (np.arange(START[unknowns]) + 0.5) * width
+    number = round(CELLS ** (1 / unknowns))
+    width = 1.0 / number
+    axis = (np.arange(number) + 0.5) * width
     places = np.stack([each.ravel() for each in np.meshgrid(*[axis] * unknowns, indexing="ij")], axis=1)
     halves = np.stack(np.meshgrid(*[[-0.25, 0.25]] * unknowns, indexing="ij"), axis=-1).reshape(-1, unknowns)
     each = likelihood(places)
-    for _ in range(REFINEMENTS):
-        kept = _kept(np.logaddexp.reduce(each, axis=1), BEST[unknowns], MOST // len(halves))
+    while width > np.sqrt(np.finfo(float).eps):
+        kept = _kept(np.logaddexp.reduce(each, axis=1), MOST // len(halves))
         places = (places[kept, None] + width * halves).reshape(-1, unknowns)
         width /= 2
         each = likelihood(places)
@@ -148,13 +141,13 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
     return Posterior(places, weights / weights.sum(), density, noise, width)
 
 
-def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
-    """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
+def _kept(density: FloatArray, most: int) -> NDArray[np.intp]:
+    """Return the indices of the cells that are divided next: all cells of high density, but at least `CELLS` cells.
 
     If these are more than `most` cells, `most` of these cells are selected at random.
     """
     order = np.argsort(density)[::-1]
-    number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))
+    number = max(int((density > density.max() - REACH).sum()), min(CELLS, density.size))
     if number <= most:
         return order[:number]
     generator = np.random.Generator(np.random.Philox(0))
@@ -174,24 +167,27 @@ def at_ends(found: Posterior) -> FloatArray:
 
 
 def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
-    """Return the indices of the unknowns with an open end, and of the unknowns that depend on these (see `LINKED`)."""
+    """Return the indices of the unknowns with an open end, and of the unknowns that depend on these.
+
+    An unknown depends on them if its spread would decrease by more than `APPROXIMATE` with these unknowns known.
+    """
     free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:
         return []
     centred = found.places - found.weights @ found.places
     others = [k for k in range(len(is_open)) if k not in free]
-    return sorted([*free, *(k for k in others if _explained(centred, found.weights, k, free) > LINKED)])
+    return sorted([*free, *(k for k in others if _reduction(centred, found.weights, k, free) > APPROXIMATE)])
 
 
-def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Return which fraction of the variance of unknown `k` a quadratic function of the unknowns `by` explains."""
+def _reduction(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
+    """Return the relative decrease of the spread of unknown `k` if a quadratic function of `by` is subtracted."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)
     left = root * centred[:, k]
     fitted = root[:, None] * terms
     rest = left - fitted @ np.linalg.lstsq(fitted, left)[0]
-    return float(1 - rest @ rest / max(left @ left, np.finfo(float).tiny))
+    return 1 - float(np.sqrt(rest @ rest / max(left @ left, np.finfo(float).tiny)))
 
 
 class Product(NamedTuple):
@@ -228,7 +224,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
     done: list[int] = []
     for i in range(len(rows)):
         size = np.abs(rows[i]) * (~np.isin(np.arange(rows.shape[1]), done))
-        lead = int(np.flatnonzero(size > 0.3 * size.max())[0])
+        lead = int(np.flatnonzero(np.round(3 * size / size.max()))[0])  # exponents are rounded to thirds
         rows[i] /= rows[i, lead]
         for j in range(len(rows)):
             if j != i:
@@ -238,11 +234,14 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return the product of powers; exponents are rounded to simple fractions (see `ROUNDED`) or to two decimals."""
+    """Return the product of powers; exponents are rounded to integers, halves or thirds, or to two decimals.
+
+    Fractions are used if the spread of the product then increases by at most `APPROXIMATE`.
+    """
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator
-        if np.any(plain) and _spread(logarithms @ plain, found.weights) <= ROUNDED * best:
+        if np.any(plain) and _spread(logarithms @ plain, found.weights) <= (1 + APPROXIMATE) * best:
             row = plain
             break
     else:

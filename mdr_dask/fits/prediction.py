@@ -12,17 +12,13 @@ from numpy.typing import NDArray
 
 from mdr_dask import aggregation, bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.measured import Measured, belonging
+from mdr_dask.campaign.measured import SAME, Measured, belonging
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown
 
-#: Relative difference up to which a measured and a computed value of a parameter count as equal. If the axis has too
-#: few values for an interpolation, `mdr_dask.tables.AGREE` is used instead.
-SAME = 1e-6
-#: All cases use the same rough lines. A few modes therefore represent the scatter of all cases. `MODES`: largest number
-#: of modes. `SHARE`: share of the variance that the modes must represent.
-MODES, SHARE = 6, 0.999
+#: Largest number of modes of the common scatter; limits the time. Chosen by trial.
+MODES = 6
 
 
 class Predicted(NamedTuple):
@@ -143,7 +139,10 @@ def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
 
 
 def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
-    """Return whether all `wanted` values are computed values of the axis."""
+    """Return whether all `wanted` values are computed values of the axis, up to the relative difference `SAME`.
+
+    If the axis has too few values for an interpolation, `mdr_dask.tables.AGREE` is used instead.
+    """
     if axis.size < FEWEST:
         return bool(np.isfinite(belonging(wanted, axis)).all())
     nearest = np.min(np.abs(wanted[:, None] - axis), axis=1)
@@ -206,7 +205,10 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 
 
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the part of the standard error that is independent for each case, and the modes of the common part."""
+    """Return the part of the standard error that is independent for each case, and the modes of the common part.
+
+    All cases use the same rough lines. A few modes therefore represent most of the variance of all cases.
+    """
     count = deviations.shape[-1]
     if count < 2:
         return np.zeros_like(mean), np.zeros((*mean.shape, 0))
@@ -217,9 +219,8 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
     each = np.nan_to_num(deviations) * (widened / np.sqrt(spare))[..., None]
     size = np.where(np.abs(mean) > 0, np.abs(mean), 1.0)
     relative = np.nan_to_num(each / size[..., None]).reshape(-1, count)
-    power, lines = np.linalg.eigh(relative.T @ relative)
-    part = np.cumsum(power[::-1]) / max(power.sum(), np.finfo(float).tiny)
-    kept = min(MODES, count - 1, 1 + int(np.searchsorted(part, SHARE)))
+    _, lines = np.linalg.eigh(relative.T @ relative)
+    kept = min(MODES, count - 1)
     modes = each @ lines[:, ::-1][:, :kept]
     rest = np.maximum((each**2).sum(axis=-1) - (modes**2).sum(axis=-1), 0.0)
     return np.sqrt(rest), modes

@@ -106,20 +106,6 @@ def test_an_unknown_may_be_bounded_from_one_side_only():
     assert "bounded from below" in found["determined"].item()
 
 
-def test_an_interval_that_is_cut_off_by_its_axis_is_named():
-    """The axis ends 2.2 standard errors above the true height."""
-    data = study().isel(relaxation_time=3, rms_roughness=slice(4), drop=True)
-    force, velocity = np.geomspace(0.1, 10, 12), np.full(12, 1.0)
-    exact = friction(force, velocity, 1e-3, 1e-6 * np.exp(-2.2 * 2 * 0.1 / np.sqrt(12)))
-    conditions = {"normal_force": force, "velocity": velocity}
-    measured = Measured("rig.csv", "mu", exact, 0.1 * exact, conditions, tuple(range(12)))
-    determined = summary(calibrate(data, measured))["determined"].item()
-    assert (
-        determined
-        == "every unknown is determined; the axis cuts off the interval of rms_roughness at 1 um: widen the axis"
-    )
-
-
 @pytest.mark.parametrize("lines", [1, 5])
 def test_an_axis_of_one_value_is_no_unknown_and_changes_nothing(lines):
     """This holds for a condition and for an unknown, with one realisation and with several."""
