@@ -32,12 +32,12 @@ from mdr_dask.fits.cases import (
 )
 from mdr_dask.fits.jumps import LAW, LEVELS, MODELS, each_jump, jump_law, jumps_of
 
+# the following four numbers were chosen by trial
 WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
 FLOOR = 0.01  # assumed grid error of mu - mu_2, as a fraction of the largest mu - mu_2 (docs/kinetics.md)
 
 TRUSTED = 0.5  # the fit of the power law uses a rate if the half width of the interval of ln(rate) is below this value
 SURE = 0.1  # the fit of the power law has weights 1 / (error of ln(rate)^2 + SURE^2), so that no single rate dominates
-INSTANT = 1e-9  # no relaxation is fitted if mu - mu_2 is at all times smaller than this fraction of the rms slope
 
 TRACE = "friction_coefficient"
 #: Constants that describe the relaxation of a case: the unit and the meaning of each constant.
@@ -154,7 +154,8 @@ def _fit_case(case: xr.Dataset) -> Relaxation | None:
         np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(of_after), 0.0, of_after), 0.0)
     )
     good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
-    if len(good) < 2 or not np.abs(good.mean(axis=0)).max() > INSTANT * jumps_of(case).slope[0]:
+    rounding = np.sqrt(np.finfo(float).eps) * jumps_of(case).slope[0]
+    if len(good) < 2 or not np.abs(good.mean(axis=0)).max() > rounding:
         return None
     means = bootstrap.means(bootstrap.complete(relaxing))
     traces = np.concatenate([means, bootstrap.moved(means[0], np.append(error[1], trace_error))])
