@@ -2,8 +2,8 @@
 
 A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``. The cluster breaks
 the layer if ``int (z - h0) dx > s D^3``, with the length D of the interval and the result s of `layer_strength` (eqs.
-5.5, 5.6). The contact zone is a window that begins at each node in turn and cuts clusters at its edges. The lines are
-closed cubic splines: the first node follows the last node. All integrals are exact.
+5.5, 5.6). The contact zone is a window, which begins at each node in turn. Clusters are cut at the edges of the window.
+The lines are closed cubic splines: the first node follows the last node. All integrals are exact.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares
 
-#: Number of equal parts of the spacing of nodes. Lengths are whole numbers of parts, as sums of integers are exact.
-#: The length of a line of 2^30 spacings is within the range of integers.
+#: Number of equal parts of a spacing between two nodes. Lengths in contact are rounded to whole numbers of parts, whose
+#: sums are exact. The length of a line of 2^30 spacings is within the range of integers.
 PARTS = 2**32
 
 
@@ -58,7 +58,7 @@ def _block(jumps: IntArray, begin: int, count: int, number: int) -> None:
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: IntArray) -> None:
-    """Add the contribution of a cluster to the windows that contain only its beginning or only its end."""
+    """Add a cluster to the lengths in contact of all windows that contain only its beginning or only its end."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
     longest = min(window, reach)
@@ -83,7 +83,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: In
 
 @jit
 def _add_middles(clusters: Clusters, c: int, window: float, jumps: IntArray) -> None:
-    """Add the contribution of a cluster to all windows that lie entirely within this cluster."""
+    """Add a cluster to the lengths in contact of all windows that lie entirely within this cluster."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
     first, last = (0, points - 1) if clusters.closed else (int(start) + 1, int(np.ceil(end - window)) - 1)

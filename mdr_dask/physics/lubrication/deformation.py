@@ -23,7 +23,7 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Replace second integrals of ``ln|x|`` in `row` by integrals of ``ln|x|`` times the hat function of each node.
+    """Replace the results of `_second_integral` at the nodes by integrals of ``ln|x|`` times the hat functions.
 
     The hat function of a node is 1 at this node, 0 at all other nodes, and linear between nodes.
     """
@@ -39,7 +39,7 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Write the integral of ``ln|point - X|`` times the hat function of each inner node j to ``row[j]``."""
+    """For each inner node j, write the integral of ``ln|point - X|`` times the hat function of j to ``row[j]``."""
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)

@@ -1,8 +1,8 @@
 """Semismooth Newton method for pressure and central film of a lubricated line contact on a given grid, in Hertz units.
 
 The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), which is
-integrated over finite volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0``. Here, P is
-the pressure at a node, and R is the inflow minus the outflow of the volume around this node. The unknowns are the
+integrated over finite volumes around the nodes. Because of cavitation, ``P >= 0``, ``R <= 0`` and ``P R = 0``. Here, P
+is the pressure at a node, and R is the inflow minus the outflow of the volume around this node. The unknowns are the
 pressures at the nodes and the film at ``X = 0``. The load gives one more equation, ``int P dX = pi/2``.
 """
 

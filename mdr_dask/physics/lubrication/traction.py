@@ -23,7 +23,7 @@ def shear_stress(
     slide_roll_ratio: float,
     eyring_stress: float | None,
 ) -> FloatArray:
-    """Return the shear stress in the middle of the film, in units of p0, where the film has the given pressures.
+    """Return the shear stress in the middle of the film, in units of p0, from the pressure and the film thickness.
 
     `pressure` is in units of p0, and `film` in units of ``a^2/R``. The Newtonian stress is ``tau = eta (u1 - u2)/h``,
     with the slide-roll ratio ``(u1 - u2)/u``. With an Eyring stress tau_E in units of p0, the stress is

@@ -24,9 +24,9 @@ class ShiftLaw:
 
     `name` is ``power``, ``arrhenius`` or ``wlf``. `constants` contains the value and the ends of the 95 % interval of
     ``exponent``, of ``activation_energy`` (J/mol), or of ``c1`` and ``c2`` (K) at the reference temperature. `factors`
-    returns the factors by the law in decades. These factors are zero at the anchor, the group whose measured factor is
-    zero by definition. `departures` are the measured factors minus the factors by the law, in decades. `chance` is the
-    probability that the errors of the factors would cause deviations at least as large if the law were exact.
+    is the law as a function of the group, in decades. The law is zero at the anchor, the group whose measured factor is
+    zero by definition. `departures` are the measured factors minus the law, in decades. `chance` is the probability
+    that the errors of the factors would cause deviations at least as large if the law were exact.
     """
 
     name: str

@@ -19,7 +19,7 @@ EXPANSION = 6e-4
 """Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
 
 OFFSET = (0.02 / np.log(10), np.log(2))
-"""Prior of the standard deviation of vertical offsets: median in decades, and scatter of the natural logarithm.
+"""Prior of the standard deviation s of vertical offsets: median of s in decades, and standard deviation of ln s.
 
 Specimens are clamped again for each temperature, and their dimensions are known to about one per cent.
 """
@@ -28,7 +28,7 @@ FREE = (0.03, 1.5)
 """Prior of the standard deviation of the steps of free vertical factors, in the form of `OFFSET`."""
 
 DETERMINED = 0.5
-"""A step between neighbouring shifts is undetermined if its standard deviation exceeds this times `STEP_SCATTER`."""
+"""A step between neighbouring shifts is undetermined if its standard deviation exceeds this share of `STEP_SCATTER`."""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 

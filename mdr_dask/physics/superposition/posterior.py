@@ -33,7 +33,7 @@ ROUNDING = 1e-5
 """Smallest scatter of a curve, decades: the rounding of a table with five digits."""
 
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
-"""Prior standard deviations, in widths of a curve: of the mean step of the shifts, and of a step about this mean."""
+"""Prior standard deviations, in widths of a curve: of the mean step between shifts, and of steps about this mean."""
 
 BEND, NOISE = 0.02, 0.01
 """Prior medians of the bend near each curve, in heights of a curve, and of the relative scatter of each channel.
@@ -87,7 +87,7 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return where the spline begins for each row of `moved`, the shifted points on which the spline is centred."""
+        """For each row of `moved` (shifted abscissae), return the start of a spline that is centred on the row."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
@@ -218,10 +218,10 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
         corner = tied + np.sum(weight, axis=1)[:, None, None] * np.diag(np.bincount(curves.member))
     try:
         factor = cholesky_banded(band[::-1], check_finite=False)
-    except LinAlgError:  # a chain diverges; 7 entries of a row, with 5 rounding errors of eps / 2 each: below 20 eps
+    except LinAlgError:  # a chain diverges; rounding error below 20 eps: 7 entries per row, 5 errors of eps / 2 each
         band[0] *= 1 + 20 * np.finfo(np.float64).eps
         factor = cholesky_banded(band[::-1], check_finite=False)
-    half = dtbtrs(factor, sides, trans="T")[0]  # M = U^-T B; computed as M^T M, B^T A^-1 B loses fewer digits
+    half = dtbtrs(factor, sides, trans="T")[0]  # M = U^-T B; B^T A^-1 B, computed as M^T M, loses fewer digits
     half, solved = (each.reshape(many, channels * splines, 1 + offsets) for each in (half, dtbtrs(factor, half)[0]))
     alone, gain, border = solved[..., :1], solved[..., 1:], half[..., 1:].swapaxes(1, 2)
     corner = corner - border @ half[..., 1:]
@@ -298,5 +298,5 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
 
 
 def step_covariance(count: int) -> FloatArray:
-    """Return the prior covariance of the steps between neighbouring curves, in widths of a curve squared."""
+    """Return the prior covariance of the steps between neighbouring curves, in squared widths of a curve."""
     return np.asarray(STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2, dtype=np.float64)

@@ -20,9 +20,7 @@ Order = Literal["none", "mean", "plane", "parabola"]
 MOST_MISSING = 0.05  # largest accepted fraction of missing points
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
 SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest ring may be due to rounding
-MOST_SCATTER = (
-    0.02  # an octave with few waves is left out: the squared harmonic that scatter alone would give exceeds this
-)
+MOST_SCATTER = 0.02  # largest squared harmonic due to scatter alone in an octave; other octaves have too few waves
 BY_SCATTER = 4.0  # a squared harmonic due to scatter exceeds this many times its mean with probability exp(-4) = 2 %
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 
@@ -46,7 +44,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
     across = np.abs(middle - 0.5 * (height[1:-1, 2:] + height[1:-1, :-2]))
-    away = np.minimum(along, across)  # a point on a crest is far from its neighbours across the crest, but not along it
+    away = np.minimum(along, across)  # a point on a crest is higher than neighbours across the crest, but not along it
     limit = FAR * 1.4826 * float(np.nanmedian(away[:: 1 + away.shape[0] // 1000, :: 1 + away.shape[1] // 1000]))
     found = np.zeros(height.shape, bool)
     if not limit > 0:
@@ -286,7 +284,7 @@ def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return the wave numbers and the two-sided C_cut of straight profiles; `power` is the sum over q and -q."""
+    """Return the wave numbers and the two-sided C_cut of straight profiles; `power` is summed over q and -q."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 

@@ -63,7 +63,7 @@ def _ordered(position: ArrayLike, height: ArrayLike) -> tuple[FloatArray, FloatA
     if x.size != z.size or x.size < 8:
         raise DataError(f"a measured line needs 8 or more pairs x, z, got {x.size} positions and {z.size} heights")
     if not np.all(np.isfinite(x) & np.isfinite(z)):
-        raise DataError("a measured line must be finite: fill the points that the instrument left out")
+        raise DataError("all x and z of a measured line must be finite: fill the points that the instrument left out")
     if x[0] > x[-1]:
         x, z = x[::-1], z[::-1]
     if np.any(np.diff(x) <= 0):

@@ -10,7 +10,7 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, inden
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.surfaces.waves import Waves
 
-SEEN = 8  # the highest point of a line is searched on a grid with this many nodes per Nyquist point
+SEEN = 8  # the highest point of a line is found on a grid with this many nodes per Nyquist point
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class RoughLine:
 
     @property
     def points(self) -> int:
-        """Number of Nyquist points."""
+        """Number of Nyquist points (see `Waves`)."""
         return self.roughness.points
 
     @cached_property

@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BEND = 3.0  # prior standard deviation of the change of the slope d log C2D / d log q between adjacent bins
-NOISE_SLOPE = -0.5  # at large q, d log C_cut / d log q is at most -1 for roughness; above this value it is noise
+NOISE_SLOPE = -0.5  # slope d log C_cut / d log q above which a tail is noise; at large q, roughness has -1 or less
 NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 

@@ -13,7 +13,7 @@ from mdr_dask.physics.surfaces.scans import Cut
 
 LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spectra deviate from power laws
 LEAST_BINS = 5  # smallest number of bins to which a power law is fitted
-LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
+LOWEST, HIGHEST = -0.1, 1.2  # range of accepted Hurst exponents
 DEVIATIONS = float(ndtri(0.975))  # half width of a 95 % interval in standard deviations
 # limits of the slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
 STEEPEST, FLATTEST = -6.0, -1.0

@@ -44,7 +44,7 @@ def heights(spline: FloatArray) -> FloatArray:
 @lru_cache(maxsize=8)
 def _closest(modes: int, nodes: int) -> FloatArray:
     """Return the factors that convert the waves to the coefficients of the least-squares spline."""
-    phase = 2 * np.pi * np.arange(1, modes + 1) / nodes  # from one node to the next
+    phase = 2 * np.pi * np.arange(1, modes + 1) / nodes  # change of phase from one node to the next
     cosine = np.cos(phase)
     transform = np.sinc(phase / (2 * np.pi)) ** 4
     images = (2416 + 2382 * cosine + 240 * (2 * cosine**2 - 1) + 2 * (4 * cosine**3 - 3 * cosine)) / 5040
@@ -80,7 +80,7 @@ def shares(t: float) -> Piece:
 
 @jit
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
-    """Append to `found` the positions, between k and k + 1, at which piece k changes sign; return the new count.
+    """Append k + t to `found` for each t from 0 to 1 at which piece k changes sign; return the new count.
 
     A piece changes sign at most three times. A piece does not change sign if all four coefficients have the same sign.
     """

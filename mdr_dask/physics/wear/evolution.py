@@ -42,8 +42,7 @@ def march(
     """Return the contact at the start of the march, and the contact at the end of every accepted time step.
 
     The march ends with the first contact for which the time is at least `end`, or `stops` returns True. `tolerance` is
-    the error of the results of ``problem.worn`` that is allowed in one time step. `first` is the length of the first
-    time step.
+    the allowed error of the results of ``problem.worn`` in one time step. `first` is the length of the first time step.
     """
     newton = _Newton(problem)
     history = [settled(problem) if start is None else start]
@@ -51,7 +50,7 @@ def march(
     while history[-1].time < end and not stops(history[-1]):
         time = history[-1].time
         if time + step == time:
-            raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
+            raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at N or s = {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
         change = 0.8 * (tolerance / max(error, 1e-300)) ** (1.0 / (min(len(history), 3) + 1))
         if moment is not None and error <= tolerance:
@@ -84,7 +83,7 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
             continue
         next_time = 0.5 * (past[-1].time + next_time)
         if next_time == past[-1].time:
-            raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
+            raise NotConvergedError(f"the wear law has no solution at N or s = {time:.6g}")
     return past[-1]
 
 
@@ -159,7 +158,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian, with finite differences in the columns of the unknowns that follow the image."""
+        """Factorise the Jacobian. The columns of the unknowns after the image are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
@@ -171,9 +170,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return weights. The weighted sum of values at `times` is the derivative at times[0] of the polynomial through
-    them.
-    """
+    """Return weights of values at `times` that give the derivative at times[0] of the interpolating polynomial."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -186,7 +183,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return weights. The weighted sum of values at `times` is the value at `time` of the polynomial through them."""
+    """Return weights of values at `times` that give the value at `time` of the interpolating polynomial."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

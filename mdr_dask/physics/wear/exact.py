@@ -58,11 +58,11 @@ class Resolution(NamedTuple):
 
     @property
     def flat(self) -> float:
-        """Rise (d - 1) / eta of the depth below which the stick border is computed from the virgin body."""
+        """Largest rise (d - 1) / eta of the depth for which the stick border is computed from the virgin body."""
         return self.step / BORDER_WEIGHT
 
     def panels(self, near: int) -> Panels:
-        """Return the panels for partial slip, with `near` more halvings at the stick border than at the edge."""
+        """Return the panels for partial slip, halved `near` times more often at the stick border than at the edge."""
         digits = -np.log10(self.accuracy)
         levels = round(2.7 * digits - 3.3)
         order = max(int(digits) + 1, 4)
@@ -305,7 +305,7 @@ def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return radii that divide an integral from c to the border, closest at the border, where the image is steep."""
+    """Return radii that divide the range from c to the border, densest at the border, where the image is steep."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
@@ -320,7 +320,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     if constant_force:
         problem = replace(problem, force=problem.normal_force(problem.start().unknowns))
     moments = march(problem, wanted[-1], resolution.step, resolution.step)
-    # in all solutions, a point that the edge passes within a time step begins to wear only at the end of this step
+    # all solutions share an error: a point that the edge passes within a time step wears only after this step
     return {
         path: replace(contact, least_errors={"contact_radius": resolution.accuracy * contact.contact_radius})
         for path, contact in ((path, _slid_contact(problem, at(problem, moments, path))) for path in wanted)

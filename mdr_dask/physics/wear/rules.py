@@ -1,8 +1,8 @@
 """The fast rule of the thesis for wear at constant depth, and the limiting profile, for any body of revolution.
 
-In the fast rule (thesis eq. 6.11), the image g depends on the cycles through `rest` = exp(-xi N / a(c)). Up to x = 1,
-y = (g - g0(c)) / (1 - g0(c)) follows a logistic law. Beyond x = 1, g - 1 is the fraction `rest` of g0 - 1. In the
-limiting profile (eqs. 6.8-6.10), `rest` is zero.
+In the fast rule (thesis eq. 6.11), the image g depends on the number of cycles N through `rest` = exp(-xi N / a(c)). Up
+to x = 1, y = (g - g0(c)) / (1 - g0(c)) follows a logistic law. Beyond x = 1, g - 1 is the fraction `rest` of g0 - 1. In
+the limiting profile (eqs. 6.8-6.10), `rest` is zero.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _ABSCISSA, _WEIGHT = gauss(16)  # 16 nodes are sufficient for the accuracy `ERRO
 
 
 class Rule(NamedTuple):
-    """One case of a power law x^exponent: stick radius c, `level` = c^exponent, eta = 1 - `level`, and `rest`."""
+    """A body with the image x^exponent: stick radius c, `level` = c^exponent, eta = 1 - `level`, and `rest`."""
 
     exponent: float
     c: float

@@ -32,10 +32,9 @@ _ABSCISSA, _WEIGHT = gauss(3)
 class Moment:
     """The contact at one `time`: the number of cycles N in partial slip, or the sliding distance s in gross slip.
 
-    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The unknown after the image
-    is the difference of r^2 between the edge and the inner border, divided by the value of this difference in the
-    virgin contact. The other unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is
-    zero at the edge.
+    `unknowns`, all of the order of one, begin with the image at all nodes except the last. The next unknown is the
+    difference of r^2 between the edge and the inner border, divided by this difference in the virgin contact. The other
+    unknowns depend on the problem. `accumulated`, shape (nodes,), is the worn depth, which is zero at the edge.
     """
 
     time: float
@@ -71,11 +70,11 @@ class Place(NamedTuple):
 class Past(NamedTuple):
     """Past contacts, the newest first. `shares` are the weights of these contacts in the BDF formula of one time step.
 
-    `worn` has the shape (contacts, nodes). At constant depth (`is_growth`), `worn` contains ln(s / s0), because s grows
-    exponentially from a very small s0. Under constant force, `worn` contains the worn depths as long as the stick
-    border moves, and `frozen` is NaN. If the border no longer moves, `frozen` is the worn depth at the border, and
-    `worn` contains (worn depth - `frozen`) / sqrt(z), where z is the position on the panels. `path` and `moved` belong
-    to the newest contact (see `SlipMoment`), and `carried` is the result of `PartialSlip.carried`.
+    `worn` has the shape (contacts, nodes). At constant depth (`is_growth` is True), `worn` contains ln(s / s0), because
+    s grows exponentially from a very small s0. Under constant force, `worn` contains the worn depths as long as the
+    stick border moves, and `frozen` is NaN. If the border no longer moves, `frozen` is the worn depth at the border,
+    and `worn` contains (worn depth - `frozen`) / sqrt(z), where z is the position on the panels. `path` and `moved`
+    belong to the newest contact (see `SlipMoment`), and `carried` is the result of `PartialSlip.carried`.
     """
 
     shares: FloatArray
@@ -154,7 +153,7 @@ class PartialSlip:
         return bool(np.min(positive) >= -CLOSE)
 
     def radius(self, place: float) -> float:
-        """Return the radius that belongs to a value of q."""
+        """Return the radius r for a value of q."""
         return math.sqrt(self.body.square + self.body.width * place)
 
     def edge(self, unknowns: FloatArray) -> float:
@@ -246,7 +245,7 @@ class PartialSlip:
 
     @cached_property
     def at_border(self) -> FloatArray:
-        """The weights that extrapolate from the nodes of the first panel to the border."""
+        """The weights that extrapolate values at the nodes of the first panel to the border."""
         mesh = self.panels.mesh
         weights = mesh.barycentric[0, -mesh.order :] / mesh.nodes[: mesh.order]
         shares = np.zeros(mesh.nodes.size)
@@ -368,7 +367,7 @@ def _known(mesh: Mesh, body: VirginBody, past: Past, place: Place) -> FloatArray
         result[nodes + i] = worn
     first, last = math.sqrt(body.square + body.width * border), math.sqrt(body.square + body.width * place.border)
     step = body.width * (place.border - border) / (first + last)
-    # b d + int (1 - d) db along the path; the terms of the last step are combined to avoid cancellation
+    # b d + int (1 - d) db along the path, d = `Place.depth`; terms of the last step are combined to avoid cancellation
     result[2 * nodes] = first * place.depth + past.carried + step * (1.0 + 0.5 * (place.depth - depth))
     return result
 
@@ -490,7 +489,7 @@ class GrossSlip:
     def normal_force(self, unknowns: FloatArray) -> float:
         """Return F_N = 2 int_0^a (d - g) dx."""
         image = self.image(unknowns)
-        # the last row of `full`, multiplied by u sqrt(1 - z), is the integral of u / (pi sqrt(z)) over z from 0 to 1
+        # the last row of `full` times the values u sqrt(1 - z) is the integral of u / (pi sqrt(z)) over z from 0 to 1
         load = (image[-1] - image) * np.sqrt(1.0 - self.panels.nodes)
         return float(np.pi * self.edge(unknowns) * self.panels.full[-1] @ load)
 

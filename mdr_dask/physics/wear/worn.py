@@ -1,8 +1,8 @@
-"""The class `Worn` for a worn contact with its errors, and the integrals from the image to profile, pressure and
-volume.
+"""The class `Worn` for a worn contact with its errors, and the integrals for profile, pressure and volume.
 
-Lengths are divided by a0, heights by d0, pressures by E* d0 / a0, volumes by a0^2 d0, and numbers of cycles by
-N0 = a0 sigma0 / (4 U0 k E*). Heights f are measured upwards from the virgin apex. Wear increases f.
+The image g(x) is the MDR line of the profile f(r). Lengths are divided by a0, heights by d0, pressures by E* d0 / a0,
+volumes by a0^2 d0, and numbers of cycles by N0 = a0 sigma0 / (4 U0 k E*). Heights f are measured upwards from the
+virgin apex. Wear increases f.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def closed(profile: Profile, scar: Scar, high: float = 1.5) -> Scar:
-    """Return the scar with the radius at which the worn profile meets the virgin profile, or 1 if nothing is worn.
+    """Return the scar with its radius, where worn and virgin profile meet. The radius is 1 if nothing is worn.
 
     `high` is a first estimate of an upper bound of the radius.
     """
