@@ -46,7 +46,7 @@ class GridSolution:
 
     @cached_property
     def density(self) -> FloatArray:
-        """Density of nodes that suits this solution, evaluated at the nodes."""
+        """Suitable density of nodes for this solution, at each node."""
         return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property

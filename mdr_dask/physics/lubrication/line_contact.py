@@ -2,7 +2,7 @@
 
 Hertz units are ``X = x/a``, ``P = p/p0`` and ``H = h R/a^2`` (thesis eq. B.13). With ``E' = 2 E*``, half width and
 maximum pressure are ``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. Preliminary solutions of a case determine
-the density of nodes on all grids of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third
+the density of nodes on all grids of 40, 80, 160, ... nodes. Films extrapolated from two grids have an error of third
 order in the spacing.
 """
 
@@ -29,7 +29,7 @@ ORDER_OF_READINGS = 2.0  # order of convergence of other extrapolated values, wh
 ACCURACY = 1e-3  # allowed relative error of the films if no accuracy is given
 #: Attempts at the first solution of a case, chosen by trial; the second attempt is slow but hardly ever fails. Each
 #: attempt has a guess of the film, divided by the expected film; an upper limit of the guess, divided by the square of
-#: the inlet position; and the number of nodes, which is also the number for the density of nodes of all further grids.
+#: the inlet position; and the number of nodes of this solution and of those that determine the density of nodes.
 ATTEMPTS = ((1.5, 0.2, 121), (2.5, 0.4, 361))
 #: `clip` of Newton's method in the first and in the second attempt on every grid, chosen by trial.
 CLIPS = (0.12, 0.06)

@@ -42,7 +42,7 @@ The bend is the standard deviation of the second differences of the spline.
 """
 
 SCALE_SCATTER = 3.0
-"""Prior standard deviation of the logarithms of bend and scatter, which may thus be 400 times larger or smaller.
+"""Prior standard deviation of ln(bend) and ln(scatter), which may thus be 400 times above or below their medians.
 
 The logarithm of the bend changes by about 1 from one curve to the next, because a master curve is bent in some places
 only.

@@ -16,7 +16,7 @@ HOPS = 2
 """Number of jumps after each move; a jump changes the step between two neighbouring curves. Chosen by trial."""
 
 CHAINS, KEPT = 24, 20
-"""Number of chains, and number of moves of each chain that are kept; as many moves before these are discarded.
+"""Number of chains, and number of moves of each chain that are kept. The same number of earlier moves is discarded.
 
 480 draws determine the ends of a 95 % interval to about 5 %.
 """
@@ -25,7 +25,7 @@ CONVERGED = 1.1
 """Potential scale reduction factor below which chains count as converged, as Gelman and Rubin recommend."""
 
 STEPS = 3
-"""Number of steps of a move, which is a quarter of a period of a normal density, on average. Chosen by trial."""
+"""Number of steps of a move, chosen by trial. A move is on average a quarter of an oscillation in a normal density."""
 
 
 def first_guess(curves: Curves) -> FloatArray:

@@ -19,9 +19,7 @@ NONE = 2.0  # result of `summit` if the cell has no maximum
 # a cubic cell rises above its higher end by at most this factor times the sum of two slopes: the upward slope at its
 # start and the downward slope at its end
 STEEPEST_RISE = 4 / 27
-UNRESOLVED = (
-    0.5  # a line is unresolved if the mean squared slopes at nodes and over cells differ by this fraction or more
-)
+UNRESOLVED = 0.5  # a line is unresolved if mean squared slopes at nodes and over cells differ by this fraction or more
 
 
 class CubicLine(NamedTuple):

@@ -33,7 +33,7 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-COARSEST = 1e-3  # default and largest `accuracy`, chosen by trial: coarse panels do not resolve steep bodies
+COARSEST = 1e-3  # default and largest `accuracy`, chosen by trial: coarser panels do not resolve steep bodies
 COARSEST_OF_MOVING = 3e-4  # largest `accuracy` under constant force: longer steps could not follow the border
 #: If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
 #: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), and is then below the rounding error.

@@ -217,7 +217,7 @@ def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_val
         return low
     if not high_value < 0.0:
         return high
-    # the order of the method is 1.7: if the value has this size, the next radius is exact except for rounding
+    # the order of the method is 1.7: if the integral is this small, the next radius is exact except for rounding
     tolerance = CLOSE * low_value
     radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
     while True:
