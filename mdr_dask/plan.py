@@ -203,7 +203,6 @@ class Estimate:
     realisations: int
     at_most: int
     results: int
-    solves: int
     blocks: int
     bytes: int
     operations: float | None
@@ -240,7 +239,10 @@ def templates(
         if needed > limit:
             counts = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
             where = f"series.{series.name}" if series.name else "parameters"
-            problems.append(f"{campaign.source}: {where}: {counts} results need {_too_much(needed, limit)}")
+            problems.append(
+                f"{campaign.source}: {where}: {counts} results need about {needed / 2**30:.4g} GiB of memory, "
+                f"expected at most the {limit / 2**30:.4g} GiB of this machine"
+            )
             continue
         outputs = _outputs(campaign, series, model)
         extra = model.coordinates(series.parameters)
@@ -253,7 +255,6 @@ def templates(
         empty = Template(campaign, series, sizes, {}, outputs, extra)
         chunks = known.get(series.name) or _choose_chunks(empty, model)
         template = Template(campaign, series, sizes, chunks, outputs, empty.extra)
-        problems += _memory_problems(template, model)
         laid_out.append(template)
     if problems:
         raise CampaignError(*problems)
@@ -265,20 +266,6 @@ def _outputs(campaign: Campaign, series: Series, model: Model[Any]) -> tuple[Out
     units = units | {companion.name: units[name] for name, companion in model.companions.items() if name in units}
     wanted = [model.output(name) for name in campaign.outputs]
     return tuple(replace(output, unit=units.get(output.name, output.unit)) for output in wanted)
-
-
-def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
-    smallest = dict.fromkeys(template.sizes, 1)
-    needed = max(model.memory(template.sample(smallest, position)) for position in (0.0, 1.0))
-    limit = available_memory()
-    if needed <= limit:
-        return []
-    what = _too_much(needed, limit)
-    return [f"{template.campaign.source}: one case needs {what} (use fewer points or less oversampling)"]
-
-
-def _too_much(needed: float, limit: float) -> str:
-    return f"about {needed / 2**30:.4g} GiB of memory, expected at most the {limit / 2**30:.4g} GiB of this machine"
 
 
 def available_memory() -> float:
@@ -357,17 +344,15 @@ def estimate(campaign: Campaign) -> Estimate:
     model, replication = models.load(campaign.model), campaign.replication
     layout = templates(campaign, replication.at_least)
     cases = sum(template.cases for template in layout)
-    counts = [_operations_and_solves(template, model) for template in layout]
     notes = (note for template in layout for note in template.notes)
     return Estimate(
         cases=cases,
         realisations=replication.at_least,
         at_most=replication.at_most,
         results=cases * replication.at_least,
-        solves=sum(solves for _, solves in counts),
         blocks=sum(math.prod(template.grid) for template in layout),
         bytes=sum(template.bytes for template in layout),
-        operations=None if model.operations is None else sum(operations for operations, _ in counts),
+        operations=None if model.operations is None else sum(map(_operations, layout)),
         files=1 + sum(template.files for template in layout) + any(series.name for series in campaign.series),
         notes=tuple(dict.fromkeys((*notes, *measured.notes(campaign)))),
         growth=sum(template.cases * _growth(template.series) for template in layout) / cases,
@@ -381,18 +366,11 @@ def _growth(series: Series) -> float:
     )
 
 
-def _operations_and_solves(template: Template, model: Model[Any]) -> tuple[float, int]:
-    """Estimate the number of operations and the number of solutions of a series from some blocks of the series."""
+def _operations(template: Template) -> float:
+    """Estimate the number of operations of a series from some blocks of the series."""
     lengths, realisations = template.grid[:-1], template.sizes["realisation"]
     blocks = math.prod(lengths)
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
-    operations, distinct = 0.0, 0.0
-    for index in zip(*np.unravel_index(sample, lengths), strict=True) if lengths else [()]:
-        place = (*map(int, index), 0)
-        operations += template.operations(place) * blocks / sample.size
-        if model.distinct is not None:
-            block = template.block(place)
-            alone = replace(block, realisations=block.realisations[:1])
-            distinct += model.distinct(alone) * blocks / sample.size
-    solves = template.cases if model.distinct is None else round(distinct)
-    return operations * realisations / min(template.chunks["realisation"], realisations), solves * realisations
+    places = zip(*np.unravel_index(sample, lengths), strict=True) if lengths else [()]
+    operations = sum(template.operations((*map(int, place), 0)) for place in places) * blocks / sample.size
+    return operations * realisations / min(template.chunks["realisation"], realisations)

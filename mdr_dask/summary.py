@@ -127,11 +127,7 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
-    solutions, blocks = _counted("different solution", costs.solves, more), _counted("block", costs.blocks, more)
-    yield f"{solutions} to compute, in {blocks}"
-    if costs.solves == 0:
-        yield "no case can be computed: all will fail (mdr-dask status --failures shows the reasons)"
-    yield f"about {_counted('file', costs.files, more)} in the store"
+    yield f"{_counted('block', costs.blocks, more)}, about {_counted('file', costs.files, more)} in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
     yield f"{sizes} uncompressed"
     if costs.seconds is not None:
@@ -152,7 +148,7 @@ def human_bytes(size: float) -> str:
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
     """Return the costs of a study for JSON. Programs of users read these keys: do not change the keys."""
-    first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
+    first = {name: getattr(costs, name) for name in ("results", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,
         "cases_at_most": round(costs.cases * costs.growth),

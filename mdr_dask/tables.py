@@ -10,6 +10,7 @@ import csv
 import io
 import math
 import re
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,8 +33,6 @@ SEPARATORS = ("\t", ";", "|", ",", BLANKS)
 SHEET = "# sheet of a workbook: "
 #: Measured values count as equal up to this relative difference, because instruments print only three digits.
 AGREE = 0.01
-#: A table without names and with more columns than this is described as a map.
-MOST_COLUMNS = 6
 NO_ROWS = "expected a line of names and at least one line of values"
 
 #: A column name that stands for a common logarithm: ``log10 q``, ``lg(q)``.
@@ -649,7 +648,7 @@ def _unit(written: str, column: Column) -> str:
             f"expected its unit, such as {column.name + f' [{example_unit(column.unit)}]'!r} in the first line"
         )
     stated = factors(unit, column.unit)
-    if column.given_unit and not np.allclose(stated, factors(column.given_unit, column.unit), rtol=1e-6, atol=0):
+    if column.given_unit and not np.allclose(stated, factors(column.given_unit, column.unit), atol=0):
         raise ValueError(
             f"the file states {written}, got the unit {column.given_unit!r}: give a unit only if the file states none"
         )
@@ -663,7 +662,7 @@ def _values(
     before, factor, zero = factors(unit, column.unit)
 
     def in_si(text: str) -> float:
-        exact = repr(10.0 ** float(text)) if is_logarithm and abs(float(text)) < 300 else text
+        exact = repr(10.0 ** float(text)) if is_logarithm and abs(float(text)) < sys.float_info.max_10_exp else text
         return before * (scaled(exact, factor) + zero)
 
     texts = sheet.cells[:, place]
@@ -709,17 +708,20 @@ def numbers(sheet: Sheet) -> FloatArray:
     return values
 
 
+def read_head(text: str) -> Sheet:
+    """Return the first rows of a table, with the names and units of its columns. Raise DataError if there are no rows.
+
+    Twenty lines are read: in the files of instruments, few lines of text stand above the names.
+    """
+    return read_sheet("\n".join(text.splitlines()[:20]), "")
+
+
 def described(text: str, source: str) -> str:
     """Return a text with the number of rows of a table, and the name, unit and range of each column as written."""
     sheet = read_sheet(text, source)
-    columns = numbers(sheet).T
-    rows = f"{len(sheet.cells)} rows"
-    if not sheet.names and len(columns) > MOST_COLUMNS:
-        return f"{rows} x {len(columns)} columns, {np.nanmin(columns):.4g} to {np.nanmax(columns):.4g}"
-    names = sheet.names or [f"column {place}" for place in range(1, len(columns) + 1)]
     ranges = []
-    for name, unit, column in zip(names, sheet.units, columns, strict=True):
+    for name, unit, column in zip(sheet.names, sheet.units, numbers(sheet).T, strict=True):
         known = column[np.isfinite(column)]
         ends = dict.fromkeys(f"{end:.4g}" for end in (known.min(), known.max())) if known.size else ["nothing"]
         ranges.append(" ".join(filter(None, [name, " to ".join(ends), unit if unit not in ("-", "1") else ""])))
-    return f"{rows}; {', '.join(ranges)}{f'; {sheet.remark}' if sheet.remark else ''}"
+    return f"{len(sheet.cells)} rows; {', '.join(ranges)}{f'; {sheet.remark}' if sheet.remark else ''}"

@@ -207,9 +207,10 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     if value == 0 or not math.isfinite(value) or not _LEADING.match(unit):
         return f"{value:.{digits}g} {unit}"
     rounded = float(f"{value:.{digits}g}")
-    power = 3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12)
+    exact = Decimal(repr(rounded))
+    power = exact.adjusted() // 3 * 3
     power = power if power in PREFIXES else 0
-    return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {PREFIXES[power]}{unit}"
+    return f"{float(exact.scaleb(-power)):.{digits}g} {PREFIXES[power]}{unit}"
 
 
 def seconds(duration: float) -> str:
@@ -224,38 +225,18 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: ``check`` asks about numbers without a unit that differ from the usual value by more than this number of decades.
-_FAR = 3.0
-
-
-def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
-    """Return whether a number without a unit may have been meant in a unit other than the SI unit.
-
-    A number with a dimension is doubtful if the number differs from the first of the `usual` values by more than 3
-    decades. Any number is also doubtful if the unit of one of the `usual` values would bring the number nearer to the
-    first usual value.
-    """
-    if value == 0:
-        return False
-    in_si = _decades(value, unit, usual[0])
-    return (in_si > _FAR + 1e-9 and unit != "1") or any(
-        _decades(to_si(f"{value!r} {each}", unit), unit, usual[0]) < in_si for each in map(unit_behind, usual)
-    )
-
-
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
-    """Return a number with the unit in which the number was probably meant, or an empty text.
+    """Return a number without a unit together with the unit in which the number was probably meant.
 
-    Of the units of the `usual` values, the unit is chosen that brings the number nearest to the first usual value. The
-    text is empty if the number in this unit still differs from the first usual value by more than 3 decades.
+    This is the unit of the one of the `usual` values that brings the number nearest to the first usual value. The text
+    is empty if no unit brings the number nearer than the SI unit does.
     """
-    found = {}
+    found = {"": _decades(value, unit, usual[0])}
     for each in usual:
         meant = f"{value:g} {unit_behind(each)}"
         with suppress(ValueError):  # the converted number is too large
             found[meant] = _decades(to_si(meant, unit), unit, usual[0])
-    nearest = min(found, key=lambda meant: found[meant], default="")
-    return nearest if nearest and found[nearest] <= _FAR + 1e-9 else ""
+    return min(found, key=lambda meant: found[meant])
 
 
 def _decades(value: float, unit: str, usual: str) -> float:
@@ -287,7 +268,7 @@ def _may_be_unit(text: str) -> bool:
 def scaled(number: str, factor: float) -> float:
     """Return the product of a number and a factor, rounded correctly if the factor is a power of ten."""
     power = round(math.log10(factor))
-    if math.isclose(factor, 10.0**power, rel_tol=1e-12):
+    if math.isclose(factor, 10.0**power):
         return float(Decimal(number).scaleb(power))
     return float(number) * factor
 

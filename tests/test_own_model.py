@@ -272,7 +272,6 @@ def test_a_result_that_is_not_as_declared_is_a_failed_case(example, monkeypatch,
     ("broken", "sentence"),
     [
         ("operations=lambda block: 1 / 0", "'operations' of model 'wear_rate:MODEL' failed: ZeroDivisionError"),
-        ("memory=lambda block: None", "'memory' of model .* failed: TypeError"),
         ("notes=lambda cases: cases[9]", "'notes' of model .* failed: "),
     ],
 )

@@ -37,7 +37,6 @@ WRONG = [
     ("sensitivity STORE friction_coefficient -o new/x.png", "saltelli"),
     # files that are read
     ("check nowhere.yaml", "nowhere.yaml"),
-    ("run large.yaml --store new/x.zarr", "large.yaml: ", "memory"),
     ("run small.yaml --cluster small.yaml", "small.yaml:1:1: name", "known: class"),
     ("run small.yaml --cluster class.yaml", "class.yaml:1:8: class", "dask_jobqueue"),
     ("run small.yaml --cluster number.yaml", "number.yaml:2:12: arguments", "3"),
@@ -70,7 +69,6 @@ def folder(tmp_path_factory):
     for name, text in {
         "small.yaml": CAMPAIGN,
         "other.yaml": CAMPAIGN.replace("hurst: 0.7", "hurst: 0.6"),
-        "large.yaml": CAMPAIGN.replace("points: 500", "points: 1000000\n  oversampling: 256"),
         "class.yaml": "class: LocalCluster\n",
         "system.yaml": "class: os.system\narguments: {command: touch ran}\n",
         "broken.yaml": "class: distributed.LocalCluster\narguments: {nobody: 1}\n",

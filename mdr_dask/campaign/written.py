@@ -13,7 +13,7 @@ from mdr_dask.campaign.document import Document, parse
 from mdr_dask.campaign.problems import Path, Problem, dotted
 from mdr_dask.campaign.variation import RANGES
 from mdr_dask.models.base import MOST
-from mdr_dask.units import is_doubtful, likely, unit_behind
+from mdr_dask.units import likely, unit_behind
 
 
 @lru_cache(maxsize=16)
@@ -54,17 +54,14 @@ def questions(
                 continue
             unit = units.get(dotted(field), fields.unit_at(parameters, field, data) or "1")
             usual = fields.usual(info)
-            if usual and document.place(at) not in document.problems and is_doubtful(value, unit, usual):
+            if usual and document.place(at) not in document.problems and (meant := likely(value, unit, usual)):
                 asked.add(field)
-                yield str(Problem(document.place(at), dotted(at), _question(value, unit, usual)))
+                yield str(Problem(document.place(at), dotted(at), _question(value, unit, meant)))
 
 
-def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
+def _question(value: float, unit: str, meant: str) -> str:
     read = f"{value:g} {unit}".removesuffix(" 1")
-    meant = likely(value, unit, usual)
-    if meant:
-        return f"{value:g} is read as {read}: write {meant!r} if you mean that, {read!r} if not"
-    return f"{value:g} is read as {read}, far from the usual {usual[0]}: write {read!r} if you mean that"
+    return f"{value:g} is read as {read}: write {meant!r} if you mean that, {read!r} if not"
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:

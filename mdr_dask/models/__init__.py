@@ -108,7 +108,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
     if not isinstance(found, Model):
         raise ModelError(f"expected {name!r} to be an mdr_dask.models.base.Model, got {type(found).__name__}")
     _digest_at_import(found.compute)
-    others = ("operations", "memory", "distinct", "coordinates", "units", "notes")
+    others = ("operations", "coordinates", "units", "notes")
     guarded: dict[str, Any] = {
         each: _guarded(name, each, getattr(found, each)) for each in others if getattr(found, each) is not None
     }
@@ -121,7 +121,7 @@ def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[
     def call(argument: Any) -> Any:
         try:
             found = function(argument)
-            if what in ("operations", "memory") and not 0 <= float(found) < math.inf:
+            if what == "operations" and not 0 <= float(found) < math.inf:
                 raise ValueError(f"expected a number that is not negative, got {found!r}")
         except Exception as error:
             raise ModelError(f"the function {what!r} of model {model!r} failed: {reason(error)}") from None

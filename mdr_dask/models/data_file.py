@@ -13,10 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, mod
 
 from mdr_dask.errors import DataError, similar
 from mdr_dask.models.base import Parameters
-from mdr_dask.tables import decoded, described
-
-#: `DataFile.notes` describes the columns of a file only if the file is smaller than this size in bytes.
-LARGEST_TABLE = 10**7
+from mdr_dask.tables import decoded, described, read_head
 
 
 class DataFile(BaseModel):
@@ -52,8 +49,8 @@ class DataFile(BaseModel):
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note with the columns of a table and the range of each column. Return no note for other files."""
-        return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
+        """Return a note with the columns of a table and the range of each column, if the columns have names."""
+        return _notes_of_file(self)
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
@@ -68,7 +65,8 @@ def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None
 @lru_cache(maxsize=64)
 def _notes_of_file(file: DataFile) -> tuple[str, ...]:
     try:
-        return (f"table {file.name}: {described(file.read_text(), file.name)}",)
+        text = file.read_text()
+        return (f"table {file.name}: {described(text, file.name)}",) if read_head(text).names else ()
     except DataError:
         return ()
 

@@ -89,8 +89,6 @@ def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_sti
     varied = varied.replace("90 GPa", "[80 GPa, 160 GPa, 320 GPa]").replace("friction: 0.6", "friction: [0.4, 0.8]")
     varied = varied.replace("wear_coefficient: 1e-4", "wear_coefficient: [1e-5, 1e-4]").replace("1 um", "0.5 um")
     path = write(varied + "  cycles: [1e3, 1e4]\n  wear_rule: exact\n")
-    assert main(["run", str(path), "--dry-run"]) == 0
-    assert "6 different solutions to compute, in 1 block" in capsys.readouterr().out
     assert main(["run", str(path)]) == 0
     streams = capsys.readouterr()
     assert streams.out == "wear.zarr: 72 done, 0 failed\n"

@@ -37,7 +37,6 @@ def test_equal_dimensionless_numbers_are_solved_once():
         }
     )
     result = MODEL.compute(block)
-    assert MODEL.distinct(block) == 2
     assert result.solves == 2
     scaled = result.values["friction_coefficient"] / result.values["rms_slope"]
     assert np.ptp(scaled, axis=0) == pytest.approx(0, abs=1e-14)
@@ -68,7 +67,7 @@ def test_an_indenter_can_vary_along_an_axis():
     block = indented(CONE, {"indenter.angle": np.array([0.1, 0.3, 0.3])})
     result = MODEL.compute(block)
     assert np.all(result.status == Status.DONE)
-    assert MODEL.distinct(block) == 4
+    assert result.solves == 4
     depth = result.values["indentation_depth"]
     assert np.all(depth[1] > depth[0])
     assert np.array_equal(depth[1], depth[2])

@@ -211,8 +211,6 @@ MODEL = Model(
     operations=deferred(_SOLVE, "operations"),
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
-    distinct=deferred(_SOLVE, "distinct"),
-    memory=deferred(_SOLVE, "memory"),
     numbers=(
         Number("load_parameter", "line_load / (2 * contact_modulus * radius)", "load parameter W = w/(E' R)"),
         Number(

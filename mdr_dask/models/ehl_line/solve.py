@@ -19,7 +19,6 @@ from mdr_dask.physics.lubrication.film_formulas import (
 from mdr_dask.physics.lubrication.grid_solution import cell_around
 from mdr_dask.physics.lubrication.line_contact import (
     ACCURACY,
-    NODES,
     LineContact,
     LineSolution,
     Reading,
@@ -168,11 +167,6 @@ def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[floa
     return notes
 
 
-def distinct(block: Block[EhlLineParameters]) -> int:
-    """Return the number of different contacts in a block. Cases with the same contact usually share a solution."""
-    return len(set(_line_contacts(block)))
-
-
 def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of a block.
 
@@ -180,9 +174,4 @@ def operations(block: Block[EhlLineParameters]) -> float:
     the position of the spike are assumed to need the finest grid.
     """
     is_sharp = block.accuracy is not None and {"pressure", "spike_position"} & set(block.outputs)
-    return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * distinct(block)
-
-
-def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory in bytes of a solution on the finest grid: three matrices of floating-point numbers."""
-    return 3.0 * 8 * (NODES[-1] + 1) ** 2
+    return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * len(set(_line_contacts(block)))

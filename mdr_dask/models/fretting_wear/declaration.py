@@ -336,7 +336,6 @@ MODEL = Model(
         *("indenter.radius", "indenter.angle", "indenter.coefficient"),
     ),
     coordinates=coordinates,
-    distinct=deferred(_SOLVE, "distinct"),
     units=units,
     notes=deferred("mdr_dask.models.fretting_wear.reduction", "notes"),
     numbers=(

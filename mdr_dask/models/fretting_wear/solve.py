@@ -73,14 +73,6 @@ def compute(block: Block[FrettingWear]) -> Result:
     return Result(values, status, messages, solves)
 
 
-def distinct(block: Block[FrettingWear]) -> int:
-    """Return the number of solutions that `compute` needs for a block."""
-    numbers, _, status = _reduced(block)
-    if _is_plain(block):
-        return _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
-    return sum(_solves_of(task, wanted) for task, wanted in _tasks(block, numbers, status).items())
-
-
 def operations(block: Block[FrettingWear]) -> float:
     """Return the approximate number of operations of a block."""
     parameters, size = block.parameters, block.cases * len(block.realisations)

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 
+ACCURACY = 0.01  # relative accuracy of friction if the campaign does not give one: below the scatter between surfaces
+
 
 def missed_accuracy(
     values: Mapping[str, ArrayLike],

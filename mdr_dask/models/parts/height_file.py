@@ -14,7 +14,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
-from mdr_dask.tables import AGREE, MOST_COLUMNS, numbers, read_sheet, read_table
+from mdr_dask.tables import AGREE, numbers, read_sheet, read_table
 from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
+MOST_COLUMNS = 6  # a text with more columns is a map, with fewer columns a table; chosen by trial
 #: File name extensions of text tables and of workbooks.
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 
@@ -148,7 +149,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     ):
         length = step * metre if step and metre else None
         user = given or (spacings[0] if spacings and units.spacing and step else None)
-        if step and user and not metre and not math.isclose(step, 1.0, rel_tol=1e-9):
+        if step and user and not metre and not math.isclose(step, 1.0):
             length = step * 10.0 ** round(math.log10(user / step))
         sources = {"its positions": length, "its heading": stated, f"`{option}`": given}
         known = [(source, length) for source, length in sources.items() if length]

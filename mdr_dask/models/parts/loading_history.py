@@ -13,7 +13,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.data_file import NamedFile, check_in_campaign
-from mdr_dask.tables import Read, read_table
+from mdr_dask.tables import AGREE, Read, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.transients.elements.loading_history import Piece
@@ -142,7 +142,7 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
             rows += [(time, rows[-1][1], rows[-1][2]), (time, then[0], then[1])]
     else:
         rows = _table_rows(protocol.file, force)
-        if len(rows) > 1 and rows[1][0] == 0 and not np.allclose(rows[0][1:], before, rtol=1e-9, atol=0):
+        if len(rows) > 1 and rows[1][0] == 0 and not np.allclose(rows[0][1:], before, rtol=AGREE, atol=0):
             raise DataError(
                 f"{protocol.file.name}: the first of two rows at t = 0 states the velocity and the force before t = 0: "
                 f"expected {before[0]:g} m/s and {before[1]:g} N, got {rows[0][1]:g} m/s and {rows[0][2]:g} N; "

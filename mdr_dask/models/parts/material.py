@@ -70,7 +70,6 @@ class PowerLaw(Parameters):
     )
 
 
-SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to stiffer than diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
@@ -126,7 +125,7 @@ class Material(Parameters):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on the error of a fitted Prony series, a temperature outside a table, and doubtful moduli."""
+        """Return notes on the error of a fitted Prony series and a temperature outside a table."""
         return (*fit_notes(self), *_table_notes(self))
 
 
@@ -244,7 +243,7 @@ def fit_notes(material: Material) -> tuple[str, ...]:
 
 
 def _table_notes(material: Material) -> tuple[str, ...]:
-    """Return notes on a table of moduli: the use of b_T, a temperature outside the table, and doubtful moduli."""
+    """Return notes on a table of moduli: the use of b_T, and a temperature outside the table."""
     table, temperature = material.dma_table, material.temperature
     if table is None:
         return ()
@@ -261,8 +260,4 @@ def _table_notes(material: Material) -> tuple[str, ...]:
             f"measured at {ends}; outside this range, at {shown(temperature, 'K')}, "
             "moduli are extrapolated by shift factors"
         )
-    least, most = float(curve.storage.min()), float(curve.storage.max())
-    if most < SOFTEST or least > STIFFEST:
-        ends = f"{shown(least, 'Pa')} to {shown(most, 'Pa')}"
-        notes.append(f"shear moduli of {ends} are not those of a solid (is the unit right?)")
     return tuple(f"table {table.file.name}: {note}" for note in notes)

@@ -25,7 +25,7 @@ _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|te
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
 #: Pairs of columns. Each pair determines storage and loss modulus.
 WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
-SAME_TEMPERATURE = 1.0  # K; temperatures that differ by at most this value count as equal
+SAME_TEMPERATURE = 1.0  # K; the temperature of one curve varies by less, those of two curves differ by more
 
 
 class ModulusTable(NamedByFile):

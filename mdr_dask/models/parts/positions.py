@@ -7,18 +7,11 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.physics.refine import SAFETY
+from mdr_dask.tables import AGREE
 from mdr_dask.units import shown
 
-OUTER = 3
-"""Largest number of rows or columns on each side of a table that may hold positions or row numbers."""
-BREAK = 3.0
-"""A row or column holds positions if its difference from the adjacent rows or columns exceeds this factor times the
-largest difference between rows or columns of heights (see `_leading`)."""
-FAR_ALONE = 10.0
-"""A number that occurs once is not a height if its distance from all other heights exceeds this many times the range of
-those other heights."""
-FEW_LEVELS = 10
-"""Heights with at most this many distinct values belong to a designed surface, such as a grating."""
+OUTER = 2  # a table may have a row of positions and a row of row numbers on each side, and such columns
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
@@ -61,7 +54,7 @@ def _leading(lines: FloatArray) -> int:
     if count <= OUTER and not rises[count:-OUTER].any():
         return count
     bends = np.nanmedian(np.abs(np.nan_to_num(np.diff(inner, 2, axis=0))), axis=1)
-    apart = np.flatnonzero(bends[: min(count, OUTER)] > BREAK * np.max(bends[OUTER:-OUTER]))
+    apart = np.flatnonzero(bends[: min(count, OUTER)] > SAFETY * np.max(bends[OUTER:-OUTER]))
     return int(apart[-1]) + 1 if apart.size else 0
 
 
@@ -76,7 +69,7 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
     Rows of consecutive integers are row numbers and are ignored. Return None if no other rows are left.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
-    if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
+    if any(abs(step - steps[0]) > AGREE * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
         raise DataError(
             f"more than one {name} of positions, and their steps differ ({apart}): delete all but one {name}"
@@ -127,24 +120,22 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
 
     The largest number is replaced if its distance from the next smaller number exceeds the range of the inner numbers,
     which are all numbers without the smallest and the largest. The same applies to the smallest number. A number that
-    occurs only once may be the height of a narrow groove or peak. Such a number is replaced only if the distance
-    exceeds `FAR_ALONE` times the range. A surface such as a grating, with at most `FEW_LEVELS` distinct inner numbers,
-    is left unchanged.
+    occurs only once may be the height of a narrow groove or peak, and is not replaced. A surface with a single inner
+    number, such as a grating with three levels, is left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []
     while True:
         low, high = (float(end) for end in (np.nanmin(height), np.nanmax(height)))
         rest = height[(height > low) & (height < high)]
-        if np.unique(rest[:: 1 + rest.size // 1000]).size <= FEW_LEVELS:
+        if rest.size == 0 or np.ptp(rest) == 0:
             return height, tuple(found)
         codes = []
         for code, distance in ((low, rest.min() - low), (high, high - rest.max())):
             count = np.count_nonzero(height == code)
-            if distance > np.ptp(rest) * (1.0 if count > 1 else FAR_ALONE):
+            if count > 1 and distance > np.ptp(rest):
                 codes.append(code)
-                points = f"{count} points" if count > 1 else "1 point"
-                found.append(f"points counted as missing: {points} at {shown(code, 'm')}, far from all others")
+                found.append(f"points counted as missing: {count} points at {shown(code, 'm')}, far from all others")
         if not codes:
             return height, tuple(found)
         height[np.isin(height, codes)] = np.nan

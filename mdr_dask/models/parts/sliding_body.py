@@ -147,5 +147,5 @@ def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:
         return "outside the data, so that the solid is extrapolated at every velocity"
-    far = [f"{decades:.2g} decades {side}" for side, decades in beyond.items() if decades > 0.05]
+    far = [f"{decades:.2g} decades {side}" for side, decades in beyond.items() if round(decades, 1)]
     return f"extrapolated {' and '.join(far)}" if far else "inside"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Status, canonical
+from mdr_dask.models.base import LEAST, MOST, Block, Status, canonical
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Generated, Measured, OfSurface, Roughness, Smooth
@@ -34,7 +34,6 @@ STATUS = np.array(
     dtype=np.int8,
 )
 """The status that is stored for each outcome of a solver."""
-LEAST = 1e-100  # a product of three numbers between LEAST and 1 / LEAST does not overflow or underflow
 
 
 @dataclass(frozen=True)
@@ -163,8 +162,8 @@ def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, len
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
     """Add a message for every case with a dimensionless number that may overflow or underflow."""
     for name, column in numbers.items():
-        for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
-            between = f"expected {name} between {LEAST:g} and {1 / LEAST:g}, got {column[j]:.9g}"
+        for j in np.flatnonzero(~((column > LEAST) & (column < MOST))):
+            between = f"expected {name} between {LEAST:g} and {MOST:g}, got {column[j]:.9g}"
             faults.setdefault(int(j), f"{between}; check the units")
 
 

@@ -14,7 +14,7 @@ from mdr_dask.headings import Column
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import DataFile, NamedByFile, NamedFile
 from mdr_dask.models.parts.height_file import Scan, Units, read_map, read_scan
-from mdr_dask.tables import matched, read_sheet, read_table
+from mdr_dask.tables import matched, read_head, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-CUT_ERROR = 0.05  # assumed relative error of each point, if a table contains the spectrum of straight profiles
+POINT_ERROR = 0.1  # assumed relative error of each value of a spectrum without errors, chosen by trial
 # A surface counts as isotropic if its anisotropy does not exceed this value. The slopes along x and y then differ by at
 # most about a quarter.
 MOST_ANISOTROPY = 0.25
-FORM = 0.9  # heights contain a form if a parabola explains more than this fraction of the mean square height
 
 #: Columns of a table that contains a spectrum.
 COLUMNS = (
@@ -37,6 +36,9 @@ COLUMNS = (
     Column("C cut", "m^3", ("cut", "scan spectrum"), needed=False, above=0),
     Column("relative error", "1", needed=False, least=0),
 )
+KINDS = ("C2D", "C1D", "C cut")
+#: Pairs of columns. The first pair that a table contains is used.
+WAYS = [(place, kind) for kind in KINDS for place in ("wavenumber", "wavelength")]
 
 
 class Found(NamedTuple):
@@ -136,7 +138,7 @@ class MapFiles(HeightFiles):
 def is_spectrum(text: str) -> bool:
     """Return whether a text begins with column names of a spectrum. A single one-letter name is not enough."""
     try:
-        sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
+        sheet = read_head(text)
     except DataError:
         return False
     if not sheet.names:
@@ -150,25 +152,17 @@ def _tabulated(file: DataFile) -> Found:
     from mdr_dask.physics.surfaces.scans import averaged, of_cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-    table = read_table(file.read_text(), file.name, COLUMNS, allow_missing=True)
-    places = [name for name in ("wavenumber", "wavelength") if name in table]
-    kinds = [name for name in ("C2D", "C1D", "C cut") if name in table]
-    problems = [
-        f"{file.name}: expected one column of {wanted}, got {' and '.join(found) or 'none'}"
-        for wanted, found in (("wavenumber and wavelength", places), ("C2D, C1D and C cut", kinds))
-        if len(found) != 1
-    ]
-    if problems:
-        raise DataError("\n".join(problems))
+    table = read_table(file.read_text(), file.name, COLUMNS, allow_missing=True, ways=WAYS)
+    kind = next(kind for kind in KINDS if kind in table)
     q = table["wavenumber"] if "wavenumber" in table else 2 * np.pi / table["wavelength"]
     order = np.argsort(q)
-    q, density = q[order], table[kinds[0]][order]
+    q, density = q[order], table[kind][order]
     error = None
     with file.in_errors():
-        if kinds == ["C cut"]:
-            spectrum, error = of_cut(averaged(q, density, CUT_ERROR**-2))
+        if kind == "C cut":
+            spectrum, error = of_cut(averaged(q, density, POINT_ERROR**-2))
         else:
-            spectrum = Spectrum(q, density / (np.pi * q) if kinds == ["C1D"] else density)
+            spectrum = Spectrum(q, density / (np.pi * q) if kind == "C1D" else density)
     return Found(spectrum, remarks=(table.remark,) if table.remark else (), error=error)
 
 
@@ -197,12 +191,12 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola fits the levelled heights well. The heights may then contain the form of the part.
+    """Return a warning if the levelled heights, mostly a parabola, may contain the form of the part.
 
     `level` are the heights minus a fitted plane or line. `curved` are the heights minus a fitted parabola.
     """
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
-    if not rest < (1 - FORM) * square:
+    if not 2 * rest < square:  # the parabola explains most of the mean square height
         return ()
     return (
         f"a parabola explains {100 * (1 - rest / square):.3g} % of the mean square height: this may be the form "

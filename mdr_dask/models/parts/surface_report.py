@@ -9,7 +9,15 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.surface import Surface
-from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, anisotropic, levelled_map, line_of_scan
+from mdr_dask.models.parts.surface_files import (
+    POINT_ERROR,
+    Found,
+    MapFiles,
+    ScanFiles,
+    anisotropic,
+    levelled_map,
+    line_of_scan,
+)
 from mdr_dask.physics.surfaces.scans import Cut, averaged, cut_of_lines, hann_window
 from mdr_dask.physics.surfaces.self_affine import SelfAffine, fit_self_affine, steep_limit
 from mdr_dask.physics.surfaces.waves import waves_of
@@ -75,7 +83,7 @@ def _report(surface: Surface, file: DataFile, found: Found) -> FileReport:
     row |= {"rms_gradient": found.spectrum.rms_gradient()}
     cuts: dict[str, tuple[FloatArray, FloatArray]] = {}
     if found.error is None:
-        bins = averaged(found.spectrum.wavenumber, found.spectrum.density, 100.0)
+        bins = averaged(found.spectrum.wavenumber, found.spectrum.density, POINT_ERROR**-2)
     else:  # the last wave number is beyond the data
         bins = Cut(*(column[:-1] for column in (found.spectrum.wavenumber, found.spectrum.density, found.error)))
     if surface.map is not None:

@@ -53,9 +53,7 @@ MODEL = Model(
     compute=deferred(SOLVE, "compute"),
     operations=deferred(SOLVE, "operations"),
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
-    distinct=deferred(SOLVE, "distinct"),
     notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
-    memory=deferred(SOLVE, "memory"),
     numbers=(
         *NUMBERS,
         Number(

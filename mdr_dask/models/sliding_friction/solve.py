@@ -9,7 +9,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.parts.accuracy import missed_accuracy
+from mdr_dask.models.parts.accuracy import ACCURACY, missed_accuracy
 from mdr_dask.models.parts.material import fit_error
 from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.parts.tested_range import beyond_tested
@@ -19,12 +19,7 @@ from mdr_dask.physics.sliding.cases import COLUMNS, Steady
 from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
-ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# Number of nodes of the finest grid that is usually needed, divided by the number of points of the line. The first
-# value is for plane Kelvin bodies, the second value is for all other bodies.
-USUAL_ON_PLANES, USUAL = 2, 16
-BYTES_A_NODE = 150  # peak memory in bytes per grid point, for a line and one case; 20 to 130 bytes were measured
-OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line
+OPERATIONS_A_POINT = 20  # operations of a solution for each point of the line, chosen by trial for block sizes
 
 #: Outputs that have errors, each with the corresponding column of `Steady`.
 OUTPUTS = dict(
@@ -140,39 +135,13 @@ class _Group:
         yield from beyond_tested(self.setting, self.loads[self.which], values["contact_fraction"]).items()
 
 
-def distinct(block: Block[SlidingFriction]) -> int:
-    """Return the number of solutions of a block."""
-    problems, total = sliding_problems(block), 0
-    for setting, _, members in _groups(block, problems):
-        total += problems.different(members)[0].size * _lines(block, setting)
-    return total
-
-
-def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
-    """Return the number of distinct lines: the number of realisations, or 1 if the line is not random."""
-    return len(block.realisations) if setting.roughness.is_random else 1
-
-
 def operations(block: Block[SlidingFriction]) -> float:
-    """Return the approximate number of operations of a block, from the number of grid points in all sweeps."""
-    problems, nodes = sliding_problems(block), 0.0
+    """Return the approximate number of operations of a block, which grows with the points and the Prony terms."""
+    problems, points = sliding_problems(block), 0
     for setting, case, members in _groups(block, problems):
-        solves = problems.different(members)[0].size
-        visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
-        grid = 2 if case.oversampling == "auto" else case.oversampling
-        # Computing a line costs as much as about ten sweeps. The sweeps of a case count half, because most sweeps are
-        # on coarser grids.
-        nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
-    return 1e5 + OPERATIONS_A_NODE * nodes
-
-
-def memory(block: Block[SlidingFriction]) -> float:
-    """Return the estimated peak memory of a block in bytes, for one line on the finest grid that is usually needed."""
-    problems, nodes = sliding_problems(block), 0.0
-    for setting, case, _ in _groups(block, problems):
-        grid = case.oversampling
-        if grid == "auto":
-            is_plane = setting.terms is None and setting.body is None
-            grid = USUAL_ON_PLANES if is_plane else USUAL
-        nodes = max(nodes, setting.roughness.points * float(grid))
-    return BYTES_A_NODE * nodes
+        lines = len(block.realisations) if setting.roughness.is_random else 1
+        grid = 1 if case.oversampling == "auto" else case.oversampling
+        solutions = problems.different(members)[0].size
+        modes = 0 if setting.terms is None else 4 * (1 + len(setting.terms.moduli))  # four sweeps find a depth
+        points += lines * setting.roughness.points * grid * (1 + solutions * max(modes, 1))
+    return float(OPERATIONS_A_POINT * points)

@@ -131,7 +131,6 @@ MODEL = Model(
     operations=deferred(SOLVE, "operations"),
     whole=("velocity", "normal_force", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
     coordinates=coordinates,
-    distinct=deferred(SOLVE, "distinct"),
     numbers=(*NUMBERS,),
     notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
 )

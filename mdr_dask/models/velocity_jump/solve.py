@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.parts.accuracy import missed_accuracy
+from mdr_dask.models.parts.accuracy import ACCURACY, missed_accuracy
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Measured, Roughness
@@ -42,11 +42,9 @@ from mdr_dask.physics.transients.elements.foundation import Foundation, foundati
 from mdr_dask.physics.transients.elements.loading_history import Piece, Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
-ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-OPERATIONS_MARCHED = 20  # operations of a jump, divided by the number of nodes and the number of time steps per decade
-# Operations for one element in one time step of a history. The first number is for a solid without modes, and the
-# second number is added for each mode.
-OPERATIONS_FOLLOWED, OPERATIONS_A_MODE = 300, 25
+# Operations for block sizes, chosen by trial: of a jump, divided by nodes and time steps per decade; and of one element
+# in one time step of a history, for the spring and for each mode.
+OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 100
 
 #: Names of the outputs for which errors are estimated.
 WITH_ERROR = (
@@ -293,7 +291,7 @@ class _Followed(_Group):
         nodes, last = self.setting.roughness.points * self.oversampling, self.block.parameters.relaxation_times[-1]
         begun = [piece for piece in history if piece.start < last]
         steps = sum((min(piece.end, last) - piece.start) / piece.longest_step(nodes, self.steps) for piece in begun)
-        return nodes * steps * (OPERATIONS_FOLLOWED + OPERATIONS_A_MODE * elements.rates.size)
+        return nodes * steps * OPERATIONS_FOLLOWED * (1 + elements.rates.size)
 
 
 def _check_rough(roughness: Roughness) -> None:
@@ -304,15 +302,7 @@ def _check_rough(roughness: Roughness) -> None:
             raise DataError(f"expected a rough line, got the flat profile {roughness.profile.file.name}")
 
 
-def distinct(block: Block[VelocityJump]) -> int:
-    """Return the number of solutions of a block: the number of distinct cases times the number of realisations."""
-    different = 0
-    for group in _groups(block, sliding_problems(block)):
-        different += group.different[0].size if isinstance(group, _Marched) else 1
-    return different * len(block.realisations)
-
-
 def operations(block: Block[VelocityJump]) -> float:
     """Return the approximate number of operations of a block, estimated from the nodes and time steps of its cases."""
     groups = _groups(block, sliding_problems(block))
-    return 1e6 + len(block.realisations) * sum(group.operations for group in groups)
+    return len(block.realisations) * sum(group.operations for group in groups)
