@@ -92,10 +92,10 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """Declare a physical parameter, as in ``length: float = quantity("m", "length of the line", gt=0)``.
 
     `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as
-    ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. If a number without a unit differs from
-    `usual` by more than three decades, ``check`` asks the user about this number. Further values after commas, as in
-    ``"2 GPa, 200 HV"``, show other common units of the quantity. The other arguments, such as ``default``, ``gt`` and
-    ``le``, are passed to :func:`pydantic.Field`.
+    ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. Further values after
+    commas, as in ``"2 GPa, 200 HV"``, show other common units of the quantity. If one of these units brings a number
+    without a unit nearer to the first usual value, ``check`` asks the user about this number. The other arguments,
+    such as ``default``, ``gt`` and ``le``, are passed to :func:`pydantic.Field`.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
