@@ -33,6 +33,7 @@ SEPARATORS = ("\t", ";", "|", ",", BLANKS)
 SHEET = "# sheet of a workbook: "
 #: Measured values count as equal up to this relative difference, because instruments print only three digits.
 AGREE = 0.01
+HEAD_LINES = 100  # larger than the number of lines above the names in the files of instruments, chosen by trial
 NO_ROWS = "expected a line of names and at least one line of values"
 
 #: A column name that stands for a common logarithm: ``log10 q``, ``lg(q)``.
@@ -709,11 +710,8 @@ def numbers(sheet: Sheet) -> FloatArray:
 
 
 def read_head(text: str) -> Sheet:
-    """Return the first rows of a table, with the names and units of its columns. Raise DataError if there are no rows.
-
-    Twenty lines are read: in the files of instruments, few lines of text stand above the names.
-    """
-    return read_sheet("\n".join(text.splitlines()[:20]), "")
+    """Return the first rows of a table, with the names and units of its columns. Raise DataError if there are no rows."""
+    return read_sheet("\n".join(text.splitlines()[:HEAD_LINES]), "")
 
 
 def described(text: str, source: str) -> str:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedByFile, NamedFile, check_in_campaign
-from mdr_dask.models.parts.surface_files import SPACING, UNIT, X_UNIT, doubts_of_line, scan_of
+from mdr_dask.models.parts.surface_files import SPACING, UNIT, X_UNIT, doubts_of_line, line_of_scan, scan_of
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
@@ -61,11 +60,7 @@ class ProfileFile(NamedByFile):
         return tuple(f"profile {self.file.name}: {remark}" for remark in remarks)
 
 
-@lru_cache(maxsize=16)
 def line_of(profile: ProfileFile) -> MeasuredLine:
     """Return one period of the measured line. Raise DataError if the file contains no line."""
-    from mdr_dask.physics.surfaces.measured import measured_line
-
-    scan = scan_of(profile, profile.file)
     band = profile.shortest_wavelength or 0.0, profile.longest_wavelength or 0.0
-    return measured_line(scan.position, scan.height, profile.detrend, profile.taper, *band)
+    return line_of_scan(profile, profile.file, profile.taper, *band)

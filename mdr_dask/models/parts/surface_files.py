@@ -173,13 +173,13 @@ def scan_of(options: Any, file: DataFile) -> Scan:
 
 
 @lru_cache(maxsize=64)
-def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
-    """Return a scan without its trend."""
+def line_of_scan(options: Any, file: DataFile, *taper_and_band: float) -> MeasuredLine:
+    """Return a scan without its trend. `options` has the attributes of `scan_of` and `detrend`."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    scan = scan_of(scans, file)
+    scan = scan_of(options, file)
     with file.in_errors():
-        return measured_line(scan.position, scan.height, scans.detrend)
+        return measured_line(scan.position, scan.height, options.detrend, *taper_and_band)
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
