@@ -710,7 +710,7 @@ def numbers(sheet: Sheet) -> FloatArray:
 
 
 def read_head(text: str) -> Sheet:
-    """Return the first rows of a table, with the names and units of its columns. Raise DataError if there are no rows."""
+    """Return the first rows of a table, with the names and units of its columns. Raise DataError without rows."""
     return read_sheet("\n".join(text.splitlines()[:HEAD_LINES]), "")
 
 
