@@ -37,7 +37,10 @@ def compute(block: Block[SlidingFriction]) -> Result:
     groups = [_Group(block, problems, *group) for group in _groups(block, problems)]
     for r, realisation in enumerate(block.realisations):  # all lines of a realisation have the same random phases
         for group in groups:
-            solves += group.solve(result, r, realisation)
+            if group.setting.roughness.is_random:
+                solves += group.solve(result, [r], realisation)
+            elif r == 0:
+                solves += group.solve(result, list(range(shape[1])), realisation)
     if "material_error" in block.outputs:
         materials, which = each(block, "material")
         errors = np.array([fit_error(material) for material in materials])
@@ -74,44 +77,31 @@ class _Group:
         accuracy = ACCURACY if block.accuracy is None else block.accuracy
         self.request = Request(accuracy, case.oversampling, case.scheme, with_errors, contact)
 
-    def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Solve the realisation with the index r in the block and write the results.
+    def solve(self, result: Result, equal: list[int], realisation: int) -> int:
+        """Solve a realisation, and return the number of solved cases.
 
-        Return the number of solved cases.
+        Write the results for all realisations with the same line. `equal` contains the indices of these realisations.
         """
-        roughness = self.setting.roughness
-        if r and not roughness.is_random:
-            self._repeat(result, r)
-            return 0
+        roughness, places = self.setting.roughness, np.ix_(self.members, equal)
         try:
             line = RoughLine(roughness.waves(self.block.seed, realisation), self.setting.body)
             steady, errors = solve(line, self.setting.terms, self.deborah, self.loads, self.request)
         except ValueError as problem:
-            result.messages.update({(int(j), r): str(problem) for j in self.members})
+            result.messages.update({(int(j), r): str(problem) for j in self.members for r in equal})
             return 0
         values, absolute = self._outputs(steady.columns), self._outputs(errors)
-        result.status[self.members, r] = STATUS[steady.status[self.which]]
+        result.status[places] = STATUS[steady.status[self.which]][:, None]
         if "rms_slope" in result.values:
             slope = roughness.slope(realisation) * self.height / self.length
-            result.values["rms_slope"][self.members, r] = np.where(np.isnan(values["contact_slope"]), np.nan, slope)
+            result.values["rms_slope"][places] = np.where(np.isnan(values["contact_slope"]), np.nan, slope)[:, None]
         for output in OUTPUTS:
             for name, found in ((output, values[output]), (f"{output}_error", absolute[output])):
                 if name in result.values:
-                    result.values[name][self.members, r] = np.where(np.isnan(values[output]), np.nan, found)
+                    result.values[name][places] = np.where(np.isnan(values[output]), np.nan, found)[:, None]
         for k, message in self._messages(steady, values, absolute):
-            result.add_message(int(self.members[k]), r, message)
+            for r in equal:
+                result.add_message(int(self.members[k]), r, message)
         return int(self.loads.size)
-
-    def _repeat(self, result: Result, r: int) -> None:
-        """Copy the results of the first realisation to the realisation with the index r.
-
-        Both realisations have the same line.
-        """
-        for array in result.values.values():
-            array[self.members, r] = array[self.members, 0]
-        result.status[self.members, r] = result.status[self.members, 0]
-        first = {int(j): result.messages[j, 0] for j in self.members if (j, 0) in result.messages}
-        result.messages.update({(j, r): message for j, message in first.items()})
 
     def _outputs(self, columns: FloatArray) -> dict[str, FloatArray]:
         """Convert dimensionless outputs, or errors of outputs, to SI units for every case of the group."""
