@@ -12,6 +12,7 @@ from mdr_dask.tables import AGREE
 from mdr_dask.units import shown
 
 OUTER = 2  # a table may have a row of positions and a row of row numbers on each side, and such columns
+FEW_LEVELS = 10  # at most this number of distinct heights: a designed surface such as a grating, chosen by trial
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
@@ -120,22 +121,24 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
 
     The largest number is replaced if its distance from the next smaller number exceeds the range of the inner numbers,
     which are all numbers without the smallest and the largest. The same applies to the smallest number. A number that
-    occurs only once may be the height of a narrow groove or peak, and is not replaced. A surface with a single inner
-    number, such as a grating with three levels, is left unchanged.
+    occurs only once may be the height of a narrow groove or peak. Such a number is replaced only if the distance
+    exceeds `SAFETY` times the range. A surface such as a grating, with at most `FEW_LEVELS` distinct inner numbers, is
+    left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []
     while True:
         low, high = (float(end) for end in (np.nanmin(height), np.nanmax(height)))
         rest = height[(height > low) & (height < high)]
-        if rest.size == 0 or np.ptp(rest) == 0:
+        if np.unique(rest).size <= FEW_LEVELS:
             return height, tuple(found)
         codes = []
         for code, distance in ((low, rest.min() - low), (high, high - rest.max())):
             count = np.count_nonzero(height == code)
-            if count > 1 and distance > np.ptp(rest):
+            if distance > np.ptp(rest) * (1.0 if count > 1 else SAFETY):
                 codes.append(code)
-                found.append(f"points counted as missing: {count} points at {shown(code, 'm')}, far from all others")
+                points = f"{count} points" if count > 1 else "1 point"
+                found.append(f"points counted as missing: {points} at {shown(code, 'm')}, far from all others")
         if not codes:
             return height, tuple(found)
         height[np.isin(height, codes)] = np.nan

@@ -132,6 +132,6 @@ def operations(block: Block[SlidingFriction]) -> float:
         lines = len(block.realisations) if setting.roughness.is_random else 1
         grid = 1 if case.oversampling == "auto" else case.oversampling
         solutions = problems.different(members)[0].size
-        modes = 0 if setting.terms is None else 4 * (1 + len(setting.terms.moduli))  # four sweeps find a depth
+        modes = 0 if setting.terms is None else 4 * (1 + len(setting.terms.moduli))  # chosen by trial
         points += lines * setting.roughness.points * grid * (1 + solutions * max(modes, 1))
     return float(OPERATIONS_A_POINT * points)
