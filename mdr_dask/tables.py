@@ -718,7 +718,7 @@ def described(text: str, source: str) -> str:
     """Return a text with the number of rows of a table, and the name, unit and range of each column as written."""
     sheet = read_sheet(text, source)
     ranges = []
-    for name, unit, column in zip(sheet.names, sheet.units, numbers(sheet).T, strict=True):
+    for name, unit, column in zip(sheet.names, sheet.units, numbers(sheet).T, strict=False):
         known = column[np.isfinite(column)]
         ends = dict.fromkeys(f"{end:.4g}" for end in (known.min(), known.max())) if known.size else ["nothing"]
         ranges.append(" ".join(filter(None, [name, " to ".join(ends), unit if unit not in ("-", "1") else ""])))
