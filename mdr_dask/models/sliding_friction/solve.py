@@ -82,7 +82,7 @@ class _Group:
 
         Write the results for all realisations with the same line. `equal` contains the indices of these realisations.
         """
-        roughness, places = self.setting.roughness, np.ix_(self.members, equal)
+        roughness, places = self.setting.roughness, np.ix_(self.members, np.array(equal, dtype=np.int64))
         try:
             line = RoughLine(roughness.waves(self.block.seed, realisation), self.setting.body)
             steady, errors = solve(line, self.setting.terms, self.deborah, self.loads, self.request)
