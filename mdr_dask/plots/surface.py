@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.arrays import SAME
-from mdr_dask.physics.surfaces.maps import ROUNDING
+from mdr_dask.physics.refine import EPS
 from mdr_dask.plots import colours
 from mdr_dask.plots.figure import SMOOTH, Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF
@@ -39,7 +39,7 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
         file, colour = xr.Dataset(coords={"file": Path(report.file.name).name}), colours.colour(k)
         areal.traces += _areal(report, used, colour, file)
         for (direction, (wave, cut)), (grey, dash) in zip(report.cuts.items(), CUTS, strict=False):
-            there, name = cut > ROUNDING * cut.max(), f"straight cut along {direction}"
+            there, name = cut > EPS * cut.max(), f"straight cut along {direction}"
             line.traces.append(Trace("law", columns(file, x=wave[there], y=cut[there]), name, name, grey, dash))
         wave = np.geomspace(used.wavenumber[0], used.wavenumber[-1], SMOOTH)
         method = columns(file, x=wave, y=np.pi * wave * used.at(wave))

@@ -213,13 +213,13 @@ def _steepness(slope: float) -> tuple[str, ...]:
 @lru_cache(maxsize=64)
 def scanned(scans: ScanFiles, file: DataFile) -> Found:
     """Return the spectrum of the surface from one scan, without waves that are only noise."""
-    from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, cut_of_lines, of_cut
+    from mdr_dask.physics.surfaces.scans import cut_of_lines, of_cut
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
     line = line_of_scan(scans, file)
     with file.in_errors():
         cut = cut_of_lines([line], scans.window == "hann")
-        limit = noise_limit(cut, NOISE_SLOPE, NOISE_TAIL)
+        limit = noise_limit(cut, -1.0, 0.5)
         spectrum, error = of_cut(cut.until(limit))
     remarks = (*scan_of(scans, file).remarks, *doubts_of_line(line, scans.detrend))
     return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, remarks, error)
@@ -231,7 +231,7 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
 
     With `direction`, use profiles along this direction.
     """
-    from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
+    from mdr_dask.physics.surfaces.scans import averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
     levelled = levelled_map(maps, file)
@@ -239,8 +239,8 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
     if maps.direction is None:
         spectrum, limit = rings.spectrum(), noise_limit(rings.binned())
     else:
-        spectrum = rings.along("xy".index(maps.direction))
-        limit = noise_limit(averaged(spectrum.wavenumber, spectrum.density, 1.0), NOISE_SLOPE - 1)
+        axis = "xy".index(maps.direction)
+        spectrum, limit = rings.along(axis), noise_limit(averaged(*rings.cuts[axis], 1.0), -1.0)
     return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, levelled.remarks)
 
 

@@ -19,14 +19,14 @@ NONE = 2.0  # result of `summit` if the cell has no maximum
 # a cubic cell rises above its higher end by at most this factor times the sum of two slopes: the upward slope at its
 # start and the downward slope at its end
 STEEPEST_RISE = 4 / 27
-UNRESOLVED = 0.5  # a line is unresolved if mean squared slopes at nodes and over cells differ by this fraction or more
 
 
 class CubicLine(NamedTuple):
     """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an elastomer element passes them.
 
     `enter` and `leave` are the slopes at the start and the end of each cell. If the line is not periodic, every element
-    is undeformed at the first node. A `smooth` line is periodic and has no kinks.
+    is undeformed at the first node. A `smooth` line is periodic, has no kinks, and has more than two nodes per shortest
+    wave.
     """
 
     height: FloatArray
@@ -169,7 +169,7 @@ def cut(line: CubicLine) -> Cells:
     if line.smooth and place == 1:  # if the highest point is a node, use the cell that begins there
         best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
-    if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):
+    if line.smooth:
         _resum(columns[1], columns[5])
     return Cells(*columns, place if line.periodic else 0.0, top, line.periodic)
 
@@ -215,13 +215,6 @@ def _turned(
     if not line.periodic:
         height[n] = height[n + 1] = nodes[n] - top
     return height, enter, leave, peak, mean, stretch
-
-
-def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
-    """Return whether the line has more than two nodes per shortest wave."""
-    # the sum of the squared slopes at the nodes is then close to the integral over the cells
-    by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
-    return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 
 
 @jit

@@ -11,18 +11,15 @@ from scipy import fft, sparse
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.physics.refine import EPS
 from mdr_dask.physics.surfaces.scans import Cut, averaged
-from mdr_dask.physics.surfaces.self_affine import noise_limit
+from mdr_dask.physics.surfaces.self_affine import CONFIDENCE, noise_limit
 from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 Order = Literal["none", "mean", "plane", "parabola"]
 
 MOST_MISSING = 0.05  # largest accepted fraction of missing points
 FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
-SIGNIFICANT = 1e-3  # a ring that contributes less than this fraction of the largest ring may be due to rounding
-MOST_SCATTER = 0.02  # largest squared harmonic due to scatter alone in an octave; other octaves have too few waves
-BY_SCATTER = 4.0  # a squared harmonic due to scatter exceeds this many times its mean with probability exp(-4) = 2 %
-ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
 
 
 class SurfaceMap(NamedTuple):
@@ -165,13 +162,14 @@ class MapSpectrum:
 
     def spectrum(self) -> Spectrum:
         """Return C2D from the first to the last ring with power above the rounding error."""
-        there = np.flatnonzero(self.density > ROUNDING * self.density.max(initial=0.0))
+        there = np.flatnonzero(_above_rounding(self.wavenumber * self.density))
         rings = slice(there[0], there[-1] + 1)
-        return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], ROUNDING * self.density.max()))
+        least = self.density[there].min()  # replaces the power of rings in which no wave exceeds the rounding error
+        return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], least))
 
     def binned(self) -> Cut:
         """Return C2D in logarithmic bins with relative errors."""
-        there = self.density > ROUNDING * self.density.max(initial=0.0)
+        there = _above_rounding(self.wavenumber * self.density)
         rings = self.wavenumber[there], self.density[there], 0.5 * self.independent, self.count[there]
         return averaged(*rings)
 
@@ -181,29 +179,23 @@ class MapSpectrum:
         Use the result for a grooved surface that slides along this axis.
         """
         q, cut = self.cuts[axis]
-        there = cut > ROUNDING * cut.max()
+        there = _above_rounding(q * cut)
         return Spectrum(q[there], cut[there] / (np.pi * q[there]))
 
     def anisotropy(self) -> float:
         """Return the anisotropy: 0 for an isotropic surface, 1 if all waves have one direction.
 
-        The anisotropy is the larger of the second and the fourth angular harmonic of the power. The rms of each
-        harmonic is taken over octaves of the wave number, without waves that are only noise. Octaves with few waves are
-        left out, because their harmonics have much scatter. The harmonics that scatter may cause are subtracted.
+        The anisotropy is the larger of the second and the fourth angular harmonic of the contributions of all waves to
+        the mean square of the height or of the gradient, without waves that are only noise. From the square of a
+        harmonic, the value is subtracted that scatter alone would exceed with a probability of 5 %.
         """
-        is_rough = self.wavenumber <= noise_limit(self.binned()) * (1 + 1e-9)
-        there = np.flatnonzero(significant(self.wavenumber, self.density) & is_rough)
-        octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # number only the octaves that contain rings
-        power = self.density[there] * self.wavenumber[there]
-        weight = np.bincount(octave, power)
-        scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
-        sure = scatter <= max(MOST_SCATTER, float(scatter.min()))
-        found = []
-        for harmonic in self.angular[:, there]:
-            sums = np.bincount(octave, power * harmonic.real) + 1j * np.bincount(octave, power * harmonic.imag)
-            found.append(np.mean((np.abs(sums / weight) ** 2 - BY_SCATTER * scatter)[sure]))
-        return float(np.sqrt(max(0.0, *map(float, found))))
+        there = self.wavenumber <= noise_limit(self.binned())
+        found, power = [], self.density[there] * self.wavenumber[there]
+        for weight in (power, power * self.wavenumber[there] ** 2):
+            share = weight / weight.sum()
+            scatter = np.sum(2 * share**2 / (self.count[there] * self.independent))
+            found.append(np.abs(self.angular[:, there] @ share) ** 2 + np.log(1 - CONFIDENCE) * scatter)
+        return float(np.sqrt(np.max(found, initial=0.0)))
 
 
 def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
@@ -276,11 +268,9 @@ def _rings(
     )
 
 
-def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings whose power cannot be due to the rounding of heights in a file (see `SIGNIFICANT`)."""
-    # contributions to the mean squares of height and gradient
-    height, gradient = density * wavenumber, density * wavenumber**3
-    return np.asarray((height > SIGNIFICANT * height.max()) | (gradient > SIGNIFICANT * gradient.max()))
+def _above_rounding(power: FloatArray) -> NDArray[np.bool_]:
+    """Return where a power exceeds the rounding error, which is relative to the largest power."""
+    return np.asarray(power > EPS * power.max(initial=0.0))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:

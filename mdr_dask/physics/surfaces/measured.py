@@ -14,8 +14,6 @@ from mdr_dask.errors import DataError
 Detrend = Literal["none", "mean", "line", "parabola"]
 
 ORDERS: dict[str, int] = {"mean": 0, "line": 1, "parabola": 2}
-UNEVEN = 1e-3
-"""Relative difference up to which spacings count as uniform. It is not 0, because instruments print few digits."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +44,8 @@ def measured_line(
     at each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit.
     """
     x, z = _ordered(position, height)
-    steps = np.diff(x)
     length = float(x[-1] - x[0]) * x.size / (x.size - 1)
-    if np.ptp(steps) > UNEVEN * steps.mean():
-        z = np.interp(np.linspace(x[0], x[-1], x.size), x, z)
-    z = detrended(z, detrend)
+    z = detrended(np.interp(np.linspace(x[0], x[-1], x.size), x, z), detrend)
     if taper > 0:
         z = z.mean() + (z - z.mean()) * _window(z.size, taper)
     if shortest > 0 or longest > 0:

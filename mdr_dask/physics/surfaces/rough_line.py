@@ -36,7 +36,8 @@ class RoughLine:
 
     def cubic(self, nodes: int) -> CubicLine:
         """Return the line with `nodes` cubic cells."""
-        return self.through(self.roughness.heights(nodes), self.roughness.slopes(nodes))
+        line = self.through(self.roughness.heights(nodes), self.roughness.slopes(nodes))
+        return line._replace(smooth=line.smooth and nodes > self.points)
 
     def straight(self, nodes: int) -> CubicLine:
         """Return the line with `nodes` straight cells."""

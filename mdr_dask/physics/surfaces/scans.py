@@ -19,9 +19,7 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BEND = 3.0  # prior standard deviation of the change of the slope d log C2D / d log q between adjacent bins
-NOISE_SLOPE = -0.5  # slope d log C_cut / d log q above which a tail is noise; at large q, roughness has -1 or less
-NOISE_TAIL = 0.5  # the end of the cut is tested for noise, over this many decades of the wave number
-STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
+STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value; chosen by trial, far above roughness
 
 
 class Cut(NamedTuple):
@@ -36,7 +34,7 @@ class Cut(NamedTuple):
 
     def until(self, wavenumber: float) -> Cut:
         """Return the bins up to and including a wave number."""
-        kept = self.wavenumber <= wavenumber * (1 + 1e-9)
+        kept = self.wavenumber <= wavenumber
         return Cut(*(column[kept] for column in self))
 
 

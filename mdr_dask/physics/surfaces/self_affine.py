@@ -13,11 +13,9 @@ from mdr_dask.physics.surfaces.scans import Cut
 
 LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spectra deviate from power laws
 LEAST_BINS = 5  # smallest number of bins to which a power law is fitted
-LOWEST, HIGHEST = -0.1, 1.2  # range of accepted Hurst exponents
-DEVIATIONS = float(ndtri(0.975))  # half width of a 95 % interval in standard deviations
-# limits of the slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
-STEEPEST, FLATTEST = -6.0, -1.0
-ABOVE_NOISE = 2.0  # the spectrum counts as roughness if it exceeds the noise by this factor
+CONFIDENCE = 0.95
+DEVIATIONS = float(ndtri((1 + CONFIDENCE) / 2))  # half width of a 95 % interval in standard deviations
+STEEPEST = -6.0  # least slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
 
 
 class Interval(NamedTuple):
@@ -37,20 +35,21 @@ class SelfAffine(NamedTuple):
     misfit: float  # rms deviation of log C2D from the law, divided by the standard errors
 
 
-def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
+def noise_limit(bins: Cut, roughness: float = -2.0, decades: float = 0.3) -> float:
     """Return the wave number beyond which the spectrum is noise, or infinity if the spectrum has no flat tail.
 
-    The tail comprises the last `decades` decades of the wave number. The tail is noise if its slope d log C / d log q
-    is above `flattest`, which is -1 for C2D and -0.5 for a straight profile.
+    The tail comprises the last `decades` decades of the wave number. The slope d log C / d log q is 0 for noise, and at
+    most `roughness` for a surface: -2 for C2D, and -1 for a straight profile. The tail is noise if its slope is closer
+    to 0. The spectrum is noise where the noise exceeds the roughness.
     """
     wavenumber, density = bins.wavenumber, bins.density
-    tail = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)
-    if np.count_nonzero(tail) < 3 or not np.all(density[tail] > 0):
+    there = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)
+    q, tail = wavenumber[there], density[there]
+    if q.size < 3 or not np.all(tail > 0):
         return np.inf
-    slope = np.polyfit(np.log(wavenumber[tail]), np.log(density[tail]), 1)[0]
-    if slope < flattest:
+    if np.polyfit(np.log(q), np.log(tail), 1)[0] < roughness / 2:
         return np.inf
-    above = np.flatnonzero(density > ABOVE_NOISE * np.mean(density[tail]))
+    above = np.flatnonzero(density > 2 * np.mean(tail))
     return float(wavenumber[above[-1]]) if above.size else float(wavenumber[0])
 
 
@@ -63,7 +62,7 @@ def steep_limit(bins: Cut) -> float:
     ends = np.flatnonzero(steep & np.append(steep[1:], True))
     if not np.all(there):
         return float(wavenumber[there][ends[0]]) if ends.size else float(wavenumber[there][-1])
-    return float(np.exp(x[ends[0]])) if ends.size else np.inf
+    return float(wavenumber[there][ends[0]]) if ends.size else np.inf
 
 
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
@@ -86,7 +85,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
             columns += [np.minimum(x - x[first], 0)] if first else []
             columns += [np.maximum(x - x[end], 0)] if end < last else []
             fits[first, end] = _least_squares(np.array(columns).T * weight[:, None], y * weight)
-    fits = {ends: fit for ends, fit in fits.items() if LOWEST <= -1 - fit.slope / 2 <= HIGHEST}
+    # the confidence interval of the Hurst exponent must overlap the range from 0 to 1
+    fits = {ends: fit for ends, fit in fits.items() if abs(fit.slope + 3) <= 1 + DEVIATIONS * fit.error}
     if not fits:
         return None
     full = min(fits.values(), key=lambda fit: fit.chi_squared)

@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.physics.refine import CLOSE
 
-ROUNDING = 1e-9  # points of the spectrum within this relative distance of a limit are replaced by the limit
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-STEP = 0.1  # longest interval of the quadrature, in log q
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,7 @@ class Spectrum:
     def at(self, wavenumber: ArrayLike) -> FloatArray:
         """Return C2D at wave numbers, m^4, by linear interpolation of the logarithms."""
         q = np.asarray(wavenumber, dtype=np.float64)
-        inside = (q >= self.wavenumber[0] * (1 - ROUNDING)) & (q <= self.wavenumber[-1] * (1 + ROUNDING))
+        inside = (q >= self.wavenumber[0] * (1 - CLOSE)) & (q <= self.wavenumber[-1] * (1 + CLOSE))
         density = np.zeros_like(q)
         density[inside] = np.exp(np.interp(np.log(q[inside]), *self._logs))
         return density
@@ -73,7 +72,7 @@ class Spectrum:
         if not low < high:
             ends = " to ".join(f"{2 * np.pi / q:.4g} m" for q in self.wavenumber[[0, -1]])
             raise DataError(f"expected cut-offs within the wavelengths of the spectrum, {ends}")
-        inner = (self.wavenumber > low * (1 + ROUNDING)) & (self.wavenumber < high * (1 - ROUNDING))
+        inner = (self.wavenumber > low * (1 + CLOSE)) & (self.wavenumber < high * (1 - CLOSE))
         q = np.concatenate([[low], self.wavenumber[inner], [high]])
         return Spectrum(q, self.at(q))
 
@@ -136,9 +135,10 @@ def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, F
     """Return nodes k and weights, shape (n, nodes), of the integral that gives the spectrum of a straight profile.
 
     For each of n wave numbers q, sum(weight * C2D(k)) is 2 int C2D(k) k / sqrt(k^2 - q^2) dk from k = q to infinity.
-    C2D is smooth between the ascending `edges`, and 0 outside.
+    C2D is smooth between the ascending `edges`, and 0 outside. The wave number rises at most by the factor e in each
+    interval of the quadrature.
     """
-    parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low) / STEP))[:-1] for low, high in pairwise(edges)]
+    parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low)))[:-1] for low, high in pairwise(edges)]
     bounds = np.append(np.concatenate(parts), edges[-1])
     q = wavenumber[:, None]
     u = np.sqrt(np.maximum(bounds[None, :] ** 2 - q**2, 0.0))

@@ -14,6 +14,7 @@ from scipy import fft
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.surfaces.waves import series
 
 Piece = tuple[float, float, float, float]
@@ -120,7 +121,7 @@ def _extremes(of: Piece) -> tuple[float, float]:
 def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> float:
     """Return the zero of a piece between `low` and `high`; the piece is monotonic and changes sign in this interval."""
     t = low + (high - low) * at_low / (at_low - at_high)
-    for _ in range(STEPS):
+    for _ in range(MOST_ITERATIONS):
         here = value(of, t)
         if (here > 0) == (at_low > 0):
             low = t
@@ -134,8 +135,3 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
             return following
         t = following
     return t
-
-
-#: Newton's method ends with a step of at most `CLOSE`. The remaining error is about the square of the last step. Even
-#: if every step halves the interval, `STEPS` steps are enough for the accuracy of the floating-point numbers.
-CLOSE, STEPS = 1e-7, 60
