@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.refine import EPS, SAFETY
+from mdr_dask.physics.refine import CLOSE, EPS, SAFETY
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,12 +187,13 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
     near_axis = [first * 0.03**k for k in range(1, 5)]
     cuts = [0.0, *sorted({x for x in (*near_axis, c, border, *scar.breaks) if 0.0 < x < edge}), edge]
     abscissa, weight = gauss(24 if len(cuts) < 12 else 12)
-    is_sharp = float(np.abs(slope(np.array([1e-9 * edge]))[0])) > 1e-6 * float(np.max(np.abs(slope(edge * abscissa))))
+    apex_slope = slope(np.array([np.finfo(float).tiny]))[0]
+    is_sharp = abs(apex_slope) > CLOSE * np.max(np.abs(slope(edge * abscissa)))
 
     def stress(radius: FloatArray) -> FloatArray:
         total = np.zeros_like(radius)
         inside = radius < edge
-        r = np.maximum(radius[inside], 1e-12 * edge)
+        r = np.maximum(radius[inside], 1e-100 * edge)  # tiny: with f = r^n, p(0) - p(r) ~ r^(n - 1)
         sums = np.zeros_like(r)
         for low, high in pairwise(cuts):  # substitution x = r cosh(angle), piece by piece to save memory
             begin, end = (np.arccosh(np.maximum(x / r, 1.0)) for x in (low, high))

@@ -41,3 +41,11 @@ CONTACTS = {
 def test_pressure_is_the_normal_force(name, exponent, c):
     contact = CONTACTS[name](PowerProfile(exponent), c)
     assert pressed(contact, contact.contact_radius) == pytest.approx(contact.normal_force, rel=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [1.05, 1.3, 1.7, 3.0])
+def test_pressure_at_the_axis_is_finite_unless_the_body_has_a_sharp_tip(exponent):
+    unworn = fast(PowerProfile(exponent), 0.3, 1e-9)
+    expected = exponent / (np.pi * (exponent - 1))  # int_0^1 g0'(x) / x dx / pi
+    assert unworn.pressure(np.array([0.0]))[0] == pytest.approx(expected, rel=1e-4)
+    assert np.isinf(fast(PowerProfile(1.0), 0.3, 1e-9).pressure(np.array([0.0]))[0])
