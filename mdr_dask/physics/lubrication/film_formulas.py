@@ -114,7 +114,7 @@ class FilmFormula:
     ranges: tuple[tuple[float, float], ...]
 
     def __call__(self, W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
-        """Return h/R. The arrays W, U and G broadcast."""
+        """Return the film h/R. The arrays W, U and G broadcast."""
         return np.asarray(
             self.factor
             * np.asarray(W, float) ** self.load

@@ -108,7 +108,7 @@ def expected(
 ) -> FloatArray:
     """Predict the result of `reading` on another grid from the results on one or two earlier grids.
 
-    With two grids, the error of the result is taken as proportional to the square of the spacing.
+    With two grids, the error of the result is assumed to be proportional to the square of the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:

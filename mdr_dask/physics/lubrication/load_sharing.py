@@ -44,7 +44,7 @@ def asperity_pressure(film: float, rms: float, wavelength: float, E_star: float)
 
 
 class SharedLoad(NamedTuple):
-    """Film thickness in the unit of `film_at`, and the load shares of film and asperities."""
+    """Film thickness in the unit of `film_at` (see `share_load`), and the load shares of film and asperities."""
 
     film: float
     film_share: float

@@ -55,7 +55,7 @@ TREND = 10.0
 """Prior standard deviation of the mean step of drifting offsets, divided by that of the deviations from this mean."""
 
 FARTHEST = 8.0
-"""Largest distance of the logarithm of a scale from its prior median. This limit prevents overflow."""
+"""Largest distance of ln(bend), ln(noise) or ln(offset scatter) from its prior median. This prevents overflow."""
 
 
 @dataclass(frozen=True)

@@ -32,5 +32,5 @@ class PowerLaw:
         return -self.coefficient * distance**self.exponent, left, right
 
     def scaled(self, length: float, height: float) -> PowerLaw:
-        """Return the shape in other units of length and height."""
+        """Return the same line with lengths in units of `length` and heights in units of `height`."""
         return PowerLaw(self.coefficient * length**self.exponent / height, self.exponent)

@@ -49,7 +49,7 @@ class Rule(NamedTuple):
 
 
 def limit_radius(profile: Profile, stick_radius: float) -> float:
-    """Return a(c), the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10)."""
+    """Return the scar radius a(c), the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10)."""
     return closed(profile, _scar(profile, stick_radius, 0.0)).radius
 
 
@@ -132,7 +132,7 @@ def fast_cases(
 ) -> FloatArray:
     """Return scar radius, wear volume and normal force of power-law bodies by the fast rule, shape (3, ...).
 
-    `limit_radius` is a(c).
+    `limit_radius` is the scar radius a(c) of the limiting profile.
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.ravel(part) for part in parts], dtype=float)
@@ -179,7 +179,7 @@ def _cuts(rule: Rule) -> FloatArray:
 
 @jit
 def _scar_integral(rule: Rule, radius: float, moment: int, cuts: FloatArray) -> float:
-    """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx for R = `radius`, piece by piece between the cuts."""
+    """Return the integral of (g - g0) (R^2 - x^2)^(moment - 1/2) from c to R = `radius`, in pieces between cuts."""
     total, end = 0.0, _angle(cuts[0], radius)
     for piece in range(cuts.size):
         last = piece + 1 == cuts.size or cuts[piece + 1] >= radius
@@ -237,7 +237,7 @@ def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_val
 
 @jit
 def _limit_radius(rule: Rule) -> float:
-    """Return a(c) for a rule with `rest` = 0."""
+    """Return the scar radius a(c) of the limiting profile, for a rule with `rest` = 0."""
     cuts = _cuts(rule)
     low, high = 1.0, 2.0
     low_value, high_value = _scar_integral(rule, low, 0, cuts), _scar_integral(rule, high, 0, cuts)

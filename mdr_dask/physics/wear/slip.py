@@ -132,7 +132,7 @@ class PartialSlip:
         return self.panels.nodes.size
 
     def image(self, unknowns: FloatArray) -> FloatArray:
-        """Return y at all nodes."""
+        """Return y (see `PartialSlip`) at all nodes."""
         y = unknowns[: self.size].copy()
         y[-1] = 1.0
         return y
@@ -229,7 +229,7 @@ class PartialSlip:
         return np.where(z < 0.0, frozen, np.where(z < 1.0, slipping, 0.0))
 
     def slip(self, unknowns: FloatArray) -> FloatArray:
-        """Return s at the nodes."""
+        """Return the slip s at the nodes."""
         return np.asarray(self.panels.inner @ (self.image(unknowns) * self._factor(self.place(unknowns))))
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
@@ -293,7 +293,7 @@ class PartialSlip:
         return float(steps @ (1.0 - 0.5 * (path[1, 1:] + path[1, :-1])))
 
     def slipping_load(self, unknowns: FloatArray) -> float:
-        """Return int_b^a (d - g) dx / eta, the load of the slip zone."""
+        """Return the load of the slip zone, int_b^a (d - g) dx / eta."""
         place = self.place(unknowns)
         share = (1.0 - self.image(unknowns)) * self._factor(place)
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
@@ -475,7 +475,7 @@ class GrossSlip:
         return Moment(time, unknowns, self._accumulated(unknowns, theta, known))
 
     def image(self, unknowns: FloatArray) -> FloatArray:
-        """Return g at all nodes. The last value is the depth."""
+        """Return the image g at all nodes. The last value is the depth."""
         return np.append(unknowns[: self.panels.nodes.size - 1], 1.0 if self.force is None else unknowns[-1])
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
@@ -483,11 +483,11 @@ class GrossSlip:
         return np.asarray(self.panels.outer @ self.image(unknowns) / self.edge(unknowns))
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return f at the nodes."""
+        """Return the worn profile f at the nodes."""
         return np.asarray(self.panels.full @ self.image(unknowns))
 
     def normal_force(self, unknowns: FloatArray) -> float:
-        """Return F_N = 2 int_0^a (d - g) dx."""
+        """Return the normal force F_N = 2 int_0^a (d - g) dx."""
         image = self.image(unknowns)
         # the last row of `full` times the values u sqrt(1 - z) is the integral of u / (pi sqrt(z)) over z from 0 to 1
         load = (image[-1] - image) * np.sqrt(1.0 - self.panels.nodes)

@@ -100,7 +100,7 @@ class Scar(NamedTuple):
 
 
 def worn_height(scar: Scar, radius: FloatArray) -> FloatArray:
-    """Return f - f0 = (2/pi) int_c^r (g - g0) / sqrt(r^2 - x^2) dx at r > c, by substituting x = r cos(phi)."""
+    """Return the worn depth f - f0 = (2/pi) int_c^r (g - g0) / sqrt(r^2 - x^2) dx at r > c, with x = r cos(phi)."""
     c = scar.border
     cuts = [c, *sorted(b for b in scar.breaks if b > c)]
     total = np.zeros_like(radius)
@@ -115,7 +115,7 @@ def worn_height(scar: Scar, radius: FloatArray) -> FloatArray:
 
 
 def worn_volume(scar: Scar) -> float:
-    """Return V = 4 int_c^a (g - g0) sqrt(a^2 - x^2) dx."""
+    """Return the wear volume V = 4 int_c^a (g - g0) sqrt(a^2 - x^2) dx."""
     a = scar.radius
 
     def weighted(x: FloatArray) -> FloatArray:
@@ -255,7 +255,7 @@ def check_stick_radius(stick_radius: float) -> None:
     if not 0.0 < stick_radius < 1.0:
         raise ValueError(
             f"the stick radius must lie between 0 and 1 for partial slip, got {stick_radius!r}; "
-            "an amplitude beyond mu E* d0 / G* is gross slip"
+            "an amplitude beyond mu E* d0 / G* causes gross slip"
         )
 
 
@@ -268,7 +268,7 @@ def beyond_table(profile: Profile, stick_radius: float) -> ValueError:
 
 
 def virgin_load(profile: Profile, radius: float) -> float:
-    """Return int_0^c (1 - g0) dx for c = `radius`. The substitution x = c t^4 makes a power law smooth at the axis."""
+    """Return the integral of 1 - g0 from 0 to c = `radius`. With x = c t^4, a power law becomes smooth at the axis."""
     abscissa, weight = gauss(64)
     return 4.0 * radius * float(((1.0 - profile.image(radius * abscissa**4)) * abscissa**3) @ weight)
 
