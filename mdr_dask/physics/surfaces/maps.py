@@ -164,7 +164,7 @@ class MapSpectrum:
         """Return C2D from the first to the last ring with power above the rounding error."""
         there = np.flatnonzero(_above_rounding(self.wavenumber * self.density))
         rings = slice(there[0], there[-1] + 1)
-        least = self.density[there].min()  # replaces the power of rings in which no wave exceeds the rounding error
+        least = self.density[there].min()  # density of the rings whose power is below the rounding error
         return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], least))
 
     def binned(self) -> Cut:
@@ -185,9 +185,9 @@ class MapSpectrum:
     def anisotropy(self) -> float:
         """Return the anisotropy: 0 for an isotropic surface, 1 if all waves have one direction.
 
-        The anisotropy is the larger of the second and the fourth angular harmonic of the contributions of all waves to
-        the mean square of the height or of the gradient, without waves that are only noise. From the square of a
-        harmonic, the value is subtracted that scatter alone would exceed with a probability of 5 %.
+        The second and the fourth angular harmonic are means over all waves that are not only noise. The weights are
+        the contributions of the waves to the mean square of either the height or the gradient. The anisotropy is the
+        largest of these four means. The square that scatter alone would exceed with a probability of 5 % is subtracted.
         """
         there = self.wavenumber <= noise_limit(self.binned())
         found, power = [], self.density[there] * self.wavenumber[there]
@@ -269,7 +269,7 @@ def _rings(
 
 
 def _above_rounding(power: FloatArray) -> NDArray[np.bool_]:
-    """Return where a power exceeds the rounding error, which is relative to the largest power."""
+    """Return a mask of the powers above the rounding error, which is proportional to the largest power."""
     return np.asarray(power > EPS * power.max(initial=0.0))
 
 

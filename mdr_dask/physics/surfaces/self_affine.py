@@ -15,7 +15,7 @@ LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spe
 LEAST_BINS = 5  # smallest number of bins to which a power law is fitted
 CONFIDENCE = 0.95
 DEVIATIONS = float(ndtri((1 + CONFIDENCE) / 2))  # half width of a 95 % interval in standard deviations
-STEEPEST = -6.0  # least slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
+STEEPEST = -6.0  # steepest slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
 
 
 class Interval(NamedTuple):
@@ -40,7 +40,7 @@ def noise_limit(bins: Cut, roughness: float = -2.0, decades: float = 0.3) -> flo
 
     The tail comprises the last `decades` decades of the wave number. The slope d log C / d log q is 0 for noise, and at
     most `roughness` for a surface: -2 for C2D, and -1 for a straight profile. The tail is noise if its slope is closer
-    to 0. The spectrum is noise where the noise exceeds the roughness.
+    to 0 than to `roughness`. The spectrum is noise where the noise exceeds the roughness.
     """
     wavenumber, density = bins.wavenumber, bins.density
     there = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)

@@ -135,8 +135,8 @@ def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, F
     """Return nodes k and weights, shape (n, nodes), of the integral that gives the spectrum of a straight profile.
 
     For each of n wave numbers q, sum(weight * C2D(k)) is 2 int C2D(k) k / sqrt(k^2 - q^2) dk from k = q to infinity.
-    C2D is smooth between the ascending `edges`, and 0 outside. The wave number rises at most by the factor e in each
-    interval of the quadrature.
+    C2D is smooth between the ascending `edges`, and 0 outside. In each interval of the quadrature, k rises by
+    a factor of e at most.
     """
     parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low)))[:-1] for low, high in pairwise(edges)]
     bounds = np.append(np.concatenate(parts), edges[-1])

@@ -193,7 +193,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
     def stress(radius: FloatArray) -> FloatArray:
         total = np.zeros_like(radius)
         inside = radius < edge
-        r = np.maximum(radius[inside], 1e-100 * edge)  # tiny: with f = r^n, p(0) - p(r) ~ r^(n - 1)
+        r = np.maximum(radius[inside], 1e-100 * edge)  # so small, because p(0) - p(r) ~ r^(n - 1) for f = r^n
         sums = np.zeros_like(r)
         for low, high in pairwise(cuts):  # substitution x = r cosh(angle), piece by piece to save memory
             begin, end = (np.arccosh(np.maximum(x / r, 1.0)) for x in (low, high))
