@@ -94,7 +94,7 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return a sum over all groups: the larger shift in the two rows of a group, or 0 if both shifts are negative."""
+    """Return the sum over all groups of the larger shift in the two rows of a group; negative shifts count as 0."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach

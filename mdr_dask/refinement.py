@@ -271,7 +271,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     count = max(len(groups) - 1, 1)
     around = missed[:, 1:] - missed[:, :1]
     scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; zero for one realisation
-    # with the probability 1 - CONFIDENCE, scatter alone halves an interval
+    # this quantile limits the probability that scatter alone halves an interval to 1 - CONFIDENCE
     widely = ndtri(1 - (1 - CONFIDENCE) / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])

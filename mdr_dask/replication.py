@@ -21,7 +21,7 @@ FEWEST = 12
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round, from the present number and from `growth_needed`."""
+    """Return the number of realisations after the next round, from the present `count` and from `growth_needed`."""
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
         return count

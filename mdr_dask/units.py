@@ -188,7 +188,7 @@ def expected(unit: str, usual: str = "") -> str:
     return f"{name} (such as {example!r})" if example else name
 
 
-#: Prefixes of printed units by their powers of ten.
+#: Prefixes of printed units, indexed by the power of ten.
 PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
@@ -228,8 +228,8 @@ def seconds(duration: float) -> str:
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     """Return a number without a unit together with the unit in which the number was probably meant.
 
-    This is the unit of the one of the `usual` values that brings the number nearest to the first usual value. The text
-    is empty if no unit brings the number nearer than the SI unit does.
+    The units of the `usual` values, such as ``"20 mm"``, are tried. The result is the number with the unit that makes
+    it nearest to the first usual value. The result is empty if this is the SI unit.
     """
     found = {"": _decades(value, unit, usual[0])}
     for each in usual:
@@ -333,7 +333,7 @@ def dimension_of(unit: str) -> tuple[Any, str]:
 
 
 def in_degrees(unit: str) -> str:
-    """Return ``degC`` for ``C``, ``℃`` or ``deg C``, ``degF`` for such spellings of degF, and other units unchanged."""
+    """Return ``degC`` for ``C``, ``℃`` or ``deg C``, ``degF`` for ``F`` or ``deg F``, and other units unchanged."""
     found = _DEGREES.fullmatch(unicodedata.normalize("NFKC", unit.replace("º", "°")).strip())
     return f"deg{(found[1] or found[2]).upper()}" if found else unit
 

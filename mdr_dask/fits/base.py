@@ -26,7 +26,7 @@ APPROXIMATE = 0.15
 #: Deviations count against a law if scatter and errors alone would cause such deviations with a probability below this
 #: value.
 DOUBTFUL = 1 - bootstrap.CONFIDENCE
-#: A number that is added to 1 in quadrature changes the 1 by less than `WITHIN` if it is below this value.
+#: Solution x of sqrt(1 + x^2) = 1 + `WITHIN`: if x is smaller, 1 is a good approximation of sqrt(1 + x^2).
 SMALL = float(np.sqrt((1 + WITHIN) ** 2 - 1))
 
 
@@ -102,7 +102,7 @@ class Fitted:
         return float(np.sqrt(np.mean(self.residuals[0] ** 2)))
 
     def holds(self, where: Callable[[int], str] | None = None) -> str:
-        """Return a sentence on whether the law with the fitted constants holds; `where` describes a case in words."""
+        """Return a sentence on whether the law with the fitted constants holds; ``where(k)`` describes case k."""
         if np.isnan(self.constants[0]).any():
             return f"not tested: these cases do not determine the constants; departs by {100 * self.rms:.2g} % rms"
         return verdict(self.residuals, self.count, self.constants.shape[1], where)
@@ -119,8 +119,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p): exponents or logarithms of factors. `left` returns data minus law. If
     scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the residuals.
-    These fits make the intervals wider. A constant is NaN if it is `undetermined` by the derivatives of the law at the
-    fitted constants, or by those at the `stated` constants.
+    These fits make the intervals wider. The derivatives of the law are computed at the fitted constants and at the
+    `stated` constants. A constant is NaN if it is `undetermined` according to either of them.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -162,9 +162,9 @@ def verdict(
 ) -> str:
     """Return a sentence on whether a law holds, from a stack of the relative deviations of the data from the law.
 
-    `constants` is the number of constants that were fitted to the data. `where` describes a case in words. `excluded`
-    is true if the interval of a fitted constant does not contain the stated value. In this case, the deviations are not
-    due to scatter.
+    `constants` is the number of constants that were fitted to the data. ``where(k)`` describes case k in words.
+    `excluded` is true if the interval of a fitted constant does not contain the stated value. In this case, the
+    deviations are not due to scatter.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
@@ -191,9 +191,9 @@ def law_holds(
     """Return a sentence on whether a law holds, from the relative deviations of the data.
 
     `chance` is the probability that scatter and errors alone cause such deviations. `chance` is NaN if this probability
-    is unknown, and None if scatter and errors cannot cause the deviations. With a probability of 5 %, scatter and
-    errors alone cause an rms deviation above `scatter`. The verdict is at best *approximately* if `scatter` exceeds
-    `WITHIN`, and at best *not tested* if `scatter` exceeds `APPROXIMATE`.
+    is unknown, and None if scatter and errors cannot cause the deviations. `scatter` is the rms deviation that scatter
+    and errors alone exceed with a probability of 5 %. The verdict is not *yes* if `scatter` exceeds `WITHIN`, and
+    neither *yes* nor *approximately* if `scatter` exceeds `APPROXIMATE`.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
@@ -232,7 +232,7 @@ def _signed(number: float, digits: str) -> str:
 
 
 def _percentage(number: float, limit: float) -> str:
-    """Return a percentage with two digits, or with four if two digits would read like the limit."""
+    """Return a percentage with two digits, or with four digits if two digits would make it look equal to the limit."""
     text = f"{number:.2g}"
     return _plain(text if text != f"{limit:.2g}" else f"{number:.4g}")
 

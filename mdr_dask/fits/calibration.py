@@ -41,8 +41,8 @@ from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
-#: Smallest possible measurement error, as a fraction of the rms residual of the best prediction, and number of possible
-#: sizes. Chosen by trial: the scatter of the lines may cause most of the residual.
+#: A calibration tries `DEVIATIONS` sizes of the measurement error. The smallest size is `LEAST` times the rms residual
+#: of the best prediction, because the scatter of the lines may cause most of the residual. Chosen by trial.
 LEAST, DEVIATIONS = 0.2, 14
 #: Smallest rms residual, as a fraction of the rms measured value. Smaller residuals may be due to rounding.
 _ROUNDING = float(np.sqrt(np.finfo(float).eps))
@@ -312,7 +312,7 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 def sentence(found: Calibration) -> str:
     """Return a sentence on which unknowns the data determine, and on whether the model explains the data."""
     start = (
-        "the model does not explain the measured points; for errors of measurement that would explain the residuals, "
+        "the model does not explain the measured points; with measurement errors that would explain the residuals, "
         if found.law_holds.startswith("no:")
         else ""
     )

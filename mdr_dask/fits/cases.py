@@ -167,7 +167,7 @@ def nonlinear(
         return residuals
 
     best: OptimizeResult = least_squares(misfit, stated, method="lm")
-    # an undetermined constant keeps its value in all rows, because a small residual would change it without limit
+    # an undetermined constant keeps its value in all rows, because even a small residual could change it by any amount
     solve = -np.linalg.pinv(np.where(undetermined(best.jac), 0.0, best.jac)).T
 
     def fit(rows: FloatArray) -> FloatArray:

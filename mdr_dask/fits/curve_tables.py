@@ -89,7 +89,7 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
     where = ", ".join(f"{name!r} in {lines.sum()}" for name, lines in missing.items() if lines.any())
     kept = frame[~anywhere]
     kept.attrs.update(frame.attrs)
-    return kept, f"{anywhere.sum()} of {anywhere.size} rows are left out, which have no finite number: {where}"
+    return kept, f"rows without a finite number are left out: {anywhere.sum()} of {anywhere.size} ({where})"
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
@@ -119,7 +119,7 @@ def _is(column: str, wanted: str) -> bool:
 
 
 def _joined(column: str, wanted: str) -> bool:
-    """Return whether a column is called by the wanted name and a unit, such as ``freq_hz``."""
+    """Return whether the name of a column consists of the wanted name and a unit, as in ``freq_hz``."""
     front, _, behind = column.rpartition("_")
     unit = JOINED.get(behind.casefold(), behind)
     return bool(front) and is_unit(unit) and is_called(front, wanted)
@@ -134,7 +134,7 @@ FAMILIES = (
     ("frequency", ("compliance",), "temperature"),
     ("time", ("compliance",), "temperature"),
 )
-"""Abscissa, ordinates and group to use if no option names them. The first family that fits a table is used."""
+"""Each entry names an abscissa, ordinates and a group. The first entry whose columns are all in the table is used."""
 
 
 def columns_to_use(
@@ -142,7 +142,7 @@ def columns_to_use(
 ) -> tuple[str, tuple[str, ...], str]:
     """Return the names of the columns with the abscissa, the ordinates and the group.
 
-    Columns that are not given are taken from the first of the `FAMILIES` that fits the table.
+    Columns that are not given are taken from the first of the `FAMILIES` whose columns are all in the table.
     """
     wished = None if ordinate is None else (ordinate,) if isinstance(ordinate, str) else tuple(ordinate)
     found = []
@@ -167,8 +167,8 @@ def columns_to_use(
         known = {column_of(frame, name) for name in names}
         hints = (each if each in known else each + nearest(each, names) for each in got)
         raise DataError(
-            "expected a coefficient of friction against force by velocity or temperature, or a modulus against "
-            f"frequency or time by temperature, got {', '.join(hints)}: name columns by --over, --of and --by"
+            "expected columns with friction coefficient, force, and velocity or temperature, or with modulus, frequency"
+            f" or time, and temperature, got {', '.join(hints)}: name columns by --over, --of and --by"
         )
     over, by, *ordinates = varied[0]
     return over, tuple(ordinates), by
@@ -193,7 +193,7 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
 
 
 def require_one_group(frame: pd.DataFrame, used: Sequence[str]) -> None:
-    """Raise DataError if the curves of a table differ in a further force, velocity or temperature.
+    """Raise DataError if a force, velocity or temperature that is not in the `used` columns varies in a table.
 
     In a table of moduli against time or frequency, forces and velocities are readings of the instrument and are
     ignored.

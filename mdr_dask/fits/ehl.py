@@ -37,7 +37,8 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     freedom = design.shape[0] - int(varied.sum())
     if freedom < 1 or not varied[1:].any():
         raise FitError(
-            f"expected films at more points than constants, with different W, U or G, got {design.shape[0]} points"
+            "expected film thicknesses at more points than fitted constants, with different W, U or G, got "
+            f"{design.shape[0]} points"
         )
     constants, width = np.full(4, np.nan), np.full(4, np.nan)
     solution, *_ = np.linalg.lstsq(design[:, varied], table[3], rcond=None)
@@ -70,7 +71,7 @@ def _films(data: xr.Dataset) -> Variables:
                 about = f"exponent of {_GROUPS[name]} in h/R" if k else "factor of the power law for h/R"
                 found |= measure(f"{film}_{name}{end}", float(value[k] if k else np.exp(value[k])), about)
         found |= measure(f"{film}_rms", rms(residuals), "rms relative deviation from the fitted formula")
-        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative deviation from it")
+        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative deviation from the formula")
         departures.append(residuals)
         of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
     sentences = (law_holds(np.concatenate(each), None) for each in (of_stated, departures))
@@ -91,7 +92,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "film_exponents",
         ("ehl_line",),
-        "h/R = factor W^load U^speed G^material for a map of films; compared with Pan and Hamrock (eq. 5.3)",
+        "h/R = factor W^load U^speed G^material for film thicknesses; compared with Pan and Hamrock (eq. 5.3)",
         _film_exponents,
     ),
 )

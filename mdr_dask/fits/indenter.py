@@ -33,9 +33,9 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 
 
 def _half_width(data: xr.Dataset) -> Any:
-    """Return half the width a of the contact of a smooth indenter at rest, in m.
+    """Return the half width a of the contact of a smooth indenter at rest, in m.
 
-    By thesis 3.3.2, the load F_N / (4 G) is 2 n c a^(n+1) / (n + 1).
+    By section 3.3.2 of the thesis, F_N / (4 G) is 2 n c a^(n+1) / (n + 1).
     """
     coefficient, exponent = _body(data)
     load = data["normal_force"] / (4 * data["shear_modulus"])
@@ -59,8 +59,8 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The slope of the indenter, whose square is added to that of the roughness, must be `SMALL` compared with the slope
-    of the roughness. The indenter must be pressed in by at least the rms height. The velocity must not exceed the
+    The rms slope of the indenter must be at most `SMALL` times that of the roughness, because the squares of both
+    slopes are added. The indenter must be pressed in by at least the rms height. The velocity must not exceed the
     velocity at which friction is largest.
     """
     coefficient, exponent = _body(data)

@@ -110,5 +110,5 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
         "Conventions": "CF-1.11",
         "source": f"mdr_dask {__version__}",
         **kept,
-        "comment": "interpolate linearly; valid inside the axes only; errors are half widths of 95 % intervals",
+        "comment": "interpolate linearly, only between the ends of the axes; errors are half widths of 95 % intervals",
     }

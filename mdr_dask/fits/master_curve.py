@@ -39,9 +39,9 @@ def master_curve(
 
     For the arguments see ``mdr-dask master-curve --help``. ``shift_factor`` is added to log10 of the abscissa,
     ``vertical_factor`` to log10 of the ordinate. The suffix ``_error`` marks the half width of the 68 % interval. The
-    suffixes ``_low`` and ``_high`` mark the ends of the 95 % interval. If the reference lies between two groups, the
-    factor at the reference is the factor of the best law plus the interpolated difference between the shift factors and
-    this law.
+    suffixes ``_low`` and ``_high`` mark the ends of the 95 % interval. All factors are 0 at the reference. If the
+    reference lies between two groups, the shift to the reference is interpolated: the deviations of the shift factors
+    from the best law are interpolated linearly, and added to the law.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -70,11 +70,11 @@ def master_curve(
 
 
 def _largest_offset(found: Superposition, rise: FloatArray) -> str:
-    """Return a text with the largest vertical offset of a group, after subtraction of `rise` and the median offset."""
+    """Return a text with the largest vertical offset: `rise` minus the vertical factor, relative to the median."""
     offset = rise - found.vertical
     offset -= np.median(offset)
     worst = int(np.argmax(np.abs(offset)))
-    return f"; the largest one found is {100 * (10 ** offset[worst] - 1):+.2g} % at {found.groups[worst]:.4g}"
+    return f"; the largest offset found is {100 * (10 ** offset[worst] - 1):+.2g} % at {found.groups[worst]:.4g}"
 
 
 def _sentence(kind: Vertical, largest: str = "") -> str:
@@ -85,8 +85,8 @@ def _sentence(kind: Vertical, largest: str = "") -> str:
     b_t = "b_T = rho0 T0 / (rho T)" if kind == "modulus" else "1 / b_T = rho T / (rho0 T0)"
     offset = 100 * np.log(10) * OFFSET[0]
     return (
-        f"a {kind}: {b_t} with an expansion of {EXPANSION:g} 1/K is taken out, and each temperature has an unknown "
-        f"offset of some {offset:.2g} % (--vertical none turns both off){largest}"
+        f"a {kind}: {b_t} with an expansion of {EXPANSION:g} 1/K is removed, and each temperature has an unknown "
+        f"offset of about {offset:.2g} % (--vertical none turns both off){largest}"
     )
 
 

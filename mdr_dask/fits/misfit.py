@@ -44,7 +44,7 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
         f"not tested: errors of {100 * residuals.errors:.2g} % of the measured values would hide any misfit; {size}"
     )
     if residuals.freedom < 1:
-        return "not tested: there are no more points than constants that the data determine"
+        return "not tested: expected more points than constants that the data determine"
     if np.isfinite(residuals.chi_squared):
         test = f"chi squared {residuals.chi_squared:.3g}, {residuals.freedom} degrees of freedom"
         about = f"({test}, probability {residuals.chance:.2g}); {size}"

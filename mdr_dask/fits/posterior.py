@@ -169,7 +169,7 @@ def at_ends(found: Posterior) -> FloatArray:
 def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
     """Return the indices of the unknowns with an open end, and of the unknowns that depend on these.
 
-    An unknown depends on them if its spread would decrease by more than `APPROXIMATE` with these unknowns known.
+    An unknown depends on them if its spread would decrease by more than the fraction `APPROXIMATE` if they were known.
     """
     free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:
@@ -180,7 +180,7 @@ def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
 
 
 def _reduction(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Return the relative decrease of the spread of unknown `k` if a quadratic function of `by` is subtracted."""
+    """Return by which fraction a fit of quadratic functions of the unknowns `by` reduces the spread of unknown `k`."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)
@@ -201,7 +201,7 @@ class Product(NamedTuple):
 
 
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
-    """Return the products of powers of undetermined unknowns, `free`, if the data determine these products.
+    """Return the products of powers of the undetermined unknowns `free` that the data determine.
 
     `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns).
     """
@@ -224,7 +224,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
     done: list[int] = []
     for i in range(len(rows)):
         size = np.abs(rows[i]) * (~np.isin(np.arange(rows.shape[1]), done))
-        lead = int(np.flatnonzero(np.round(3 * size / size.max()))[0])  # exponents are rounded to thirds
+        lead = int(np.flatnonzero(np.round(3 * size / size.max()))[0])  # smaller ones may be rounded to 0 later
         rows[i] /= rows[i, lead]
         for j in range(len(rows)):
             if j != i:
@@ -290,5 +290,5 @@ def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) 
 
 
 def intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
-    """Return the median and the ends of the intervals of weighted values, by their suffix (see `ENDS`)."""
+    """Return the median and the ends of the intervals of weighted values, indexed by suffix (see `ENDS`)."""
     return dict(zip(ENDS, quantiles(values, weights, SHARES).tolist(), strict=True))

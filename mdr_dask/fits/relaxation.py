@@ -101,8 +101,8 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     """
     inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # the fit uses at least nine points in time
     t, y = time[inside], traces[:, inside]
-    # A weight is proportional to the interval around its time, because friction at times close to each other carries
-    # nearly the same information.
+    # The weight of a value is proportional to the length of the time interval around it, because values at neighbouring
+    # times contain nearly the same information.
     weights = widths(t) / (error[inside] ** 2 + (FLOOR * np.abs(y[0]).max()) ** 2)
     weights /= weights.sum()
     rate, amplitude = exponential(t, y, weights)

@@ -183,7 +183,8 @@ def collapse(
     """Shift curves of ln(friction) against ln(velocity) onto a common natural cubic spline by least squares.
 
     The shifts are fitted to the first of the stacked `rows`. The shifts for the remaining rows follow by linearisation.
-    `curve` contains, for each point, the index of its curve. If `vertical` is false, curves are shifted along
+    `curve` contains, for each point, the index of its curve. `start` contains a first estimate of the shifts along
+    ln(velocity). The curve with the index `reference` is not shifted. If `vertical` is false, curves are shifted along
     ln(velocity) only.
     """
     from scipy.optimize import OptimizeResult, least_squares
@@ -297,13 +298,13 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "contact_growth",
         MODELS,
-        "L_cont / L = factor (F_N / (G h L))^exponent in zone 1, with 1 / (1 + H) by the thesis; mu over eq. 3.12",
+        "L_cont / L = factor (F_N / (G h L))^exponent in zone 1; 1 / (1 + H) by the thesis; mu divided by eq. 3.12",
         lambda series: each(series, load_and_velocity_axes, _contact_growth, "contact_fraction"),
     ),
     Fit(
         "contact_slope",
         MODELS,
-        "rms slope in contact against its length, slope_cont^2 ~ q_max^(2 - 2H) - (2 pi / L_cont)^(2 - 2H) (eq. 3.21)",
+        "rms slope in contact against L_cont: slope_cont^2 ~ q_max^(2 - 2H) - (2 pi / L_cont)^(2 - 2H) (eq. 3.21)",
         lambda series: each(series, load_and_velocity_axes, _contact_slope, "contact_slope", "contact_fraction"),
     ),
     Fit(

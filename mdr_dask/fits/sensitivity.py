@@ -124,9 +124,9 @@ def _exchanged(values: FloatArray) -> FloatArray:
 
 
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return indices and the ends of their jackknife intervals, shape (3, indices).
+    """Return the results of the function `indices`, and the ends of their jackknife intervals, shape (3, results).
 
-    `indices` takes outputs of shape (realisations, points, ...).
+    The function takes outputs of shape (realisations, points, ...).
     """
     middle, lines = indices(values), len(values)
     groups = min(bootstrap.GROUPS, values.shape[1])
@@ -153,6 +153,6 @@ def _advice(result: xr.Dataset) -> str:
         return f"enough points: every interval is narrower than +-{NARROW:g}"
     more = int(np.ceil(cases * ((widest / NARROW) ** 2 - 1)))
     return (
-        f"not enough points: the widest interval is +-{widest:.3g}; about {float(f'{more:.2g}'):g} cases more would "
-        f"make all of them +-{NARROW:g}"
+        f"not enough points: the widest interval is +-{widest:.3g}; about {float(f'{more:.2g}'):g} more cases would "
+        f"narrow it to +-{NARROW:g}"
     )

@@ -27,9 +27,9 @@ def smoothed(mean: FloatArray) -> FloatArray:
 class Top(NamedTuple):
     """The maximum of a parabola fitted to the points near the largest friction, of the data and of all resamples.
 
-    `height` is the maximum, corrected for the bias of the maximum. The interval of `height` includes the residuals of
-    the parabola. `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum.
-    `rise` is 0 unless the maximum is at an end of the fitted range.
+    `height` is the maximum, corrected for its bias. The interval of `height` includes the residuals of the parabola.
+    `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum. `rise` is 0 unless
+    the maximum is at an end of the fitted range.
     """
 
     height: FloatArray
@@ -38,7 +38,7 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to a stack of friction against x = ln(velocity), ascending, near the largest friction."""
+    """Fit a parabola near the largest friction to a stack of friction at ascending x = ln(velocity)."""
     drop, left = 2 * TOP, stack
     while left is stack or (left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL):
         drop /= 2

@@ -194,7 +194,7 @@ def test_rows_without_a_finite_number_are_counted():
     table.loc[3, "modulus"], table.loc[20, "modulus"], table.loc[40, "frequency"] = np.nan, np.inf, np.nan
     kept, sentence = finite_rows(table, ["frequency", "modulus"])
     assert len(kept) == len(table) - 3
-    assert sentence == "3 of 60 rows are left out, which have no finite number: 'frequency' in 1, 'modulus' in 2"
+    assert sentence == "rows without a finite number are left out: 3 of 60 ('frequency' in 1, 'modulus' in 2)"
     assert finite_rows(kept, ["frequency", "modulus"])[1] == ""
 
 

@@ -47,7 +47,7 @@ def test_residuals_without_known_errors_are_judged_by_their_trend():
     def judged(scaled, relative=0.1, freedom=10, errors=0.1, squares=np.nan, velocity=velocity):
         return law_holds(Residuals(scaled, relative, squares, freedom, errors), {"velocity": velocity})
 
-    assert judged(even, freedom=0).startswith("not tested: there are no more points")
+    assert judged(even, freedom=0).startswith("not tested: expected more points")
     assert judged(even).startswith("yes: ")
     assert judged(even[:3], velocity=velocity[:3]).startswith("not tested: 3 points")
     assert judged(even, freedom=3).startswith("not tested: 12 points")
