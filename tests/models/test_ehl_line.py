@@ -94,7 +94,7 @@ def test_an_impossible_traction_has_a_message() -> None:
     asked = block(("traction_coefficient",), columns, **(CHECKED | {"load_parameter": 1e-4}))
     result = compute(asked)
     assert result.values["traction_coefficient"][0, 0] > 1 > result.values["traction_coefficient"][1, 0]
-    assert "use an Eyring stress" in result.messages[0, 0]
+    assert "use shear_law: eyring" in result.messages[0, 0]
     assert (1, 0) not in result.messages
 
 

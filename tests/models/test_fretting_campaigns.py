@@ -128,7 +128,11 @@ def test_every_block_of_a_history_is_kept(write):
         ("  stick_radius: .nan\n", "4:17", "expected a finite number, got nan"),
         ("  stick_radius: 0.5\n  friction: 0.3\n", "3:1", "leave out stick_radius or all the others"),
         ("  path: 2\n  hardness: 2 GPa\n", "3:1", "leave out them, or give contact_modulus"),
-        ("  stick_radius: 0.5\n  path: 2\n  wear_rule: exact\n", "3:1", "leave out stick_radius (oscillation)"),
+        (
+            "  stick_radius: 0.5\n  path: 2\n  wear_rule: exact\n",
+            "3:1",
+            "sliding without oscillation: leave out stick_radius",
+        ),
         ("  path: 2\n  wear_rule: fast\n", "3:1", "expected wear_rule: exact, because a path is given, got 'fast'"),
         ("  indenter: {shape: power, exponent: -1}\n  stick_radius: 0.5\n", "4:38", "above 0.1, got -1"),
         ("  stick_radius: 0.5\n  last_radius: 1 mm\n", "3:1", "in a dimensionless campaign, give extent"),
@@ -200,7 +204,7 @@ def test_the_limit_needs_neither_hardness_nor_wear_coefficient(write):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        (STEEL.replace("1 um", "100 um"), "the amplitude is in gross slip: it must stay below mu E* d0 / G*"),
+        (STEEL.replace("1 um", "100 um"), "expected an amplitude below mu E* d0 / G*, where gross slip begins"),
         (TABLE, "the contact reaches beyond the table"),
     ],
 )

@@ -32,7 +32,7 @@ class EhlLineParameters(Parameters):
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
-        "neighbours": "every case is solved alone, so leave it out",
+        "neighbours": "leave it out, because every case is solved independently of the others",
         "discretisation_error": "central_film and minimum_film come with central_film_error and minimum_film_error",
         "traction_error": "traction_coefficient comes with traction_coefficient_error",
     }

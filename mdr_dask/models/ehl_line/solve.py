@@ -31,7 +31,7 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Floors (see `solve_film`): within the contact, the error of a position is divided by the half width a.
+#: Floors (see `solve_film`): the error of a position within the contact is divided by the half width a.
 _FLOORS = {"spike_position": 1.0}
 
 
@@ -146,7 +146,8 @@ def compute(block: Block[EhlLineParameters]) -> Result:
                 notes += [missed.get(0, ""), thick_film(float(solution.central_film.value) * square_of_half_width(W))]
                 if "traction_coefficient" in found and found["traction_coefficient"].value > 1:
                     notes.append(
-                        "no oil has a traction coefficient above 1, and its error is unknown: use an Eyring stress"
+                        "the traction coefficient is above 1, which no oil reaches, and its error is unknown: use "
+                        "shear_law: eyring"
                     )
             else:
                 result.status[index] = Status.NOT_CONVERGED

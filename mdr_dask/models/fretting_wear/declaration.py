@@ -38,7 +38,7 @@ class Power(indenter.Power):
 
     exponent: float = quantity("1", "exponent n of the body c r^n", usual="2", gt=0.1, le=50)
     coefficient: float | None = quantity(  # type: ignore[assignment]
-        "m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0, default=None
+        "m^(1-n)", "coefficient c of the body c r^n, with heights and radii in metres", gt=0, default=None
     )
 
 
@@ -223,7 +223,7 @@ class FrettingWear(Parameters):
         oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
         idle = [name for name in oscillating if self.path is not None and getattr(self, name)]
         if idle:
-            raise ValueError(f"path means sliding in one direction: leave out {', '.join(idle)} (oscillation)")
+            raise ValueError(f"path means sliding without oscillation: leave out {', '.join(idle)}")
         if self.dimensionless and given:
             kind = "stick_radius" if self.path is None else "path without contact_modulus"
             raise ValueError(
@@ -247,7 +247,7 @@ class FrettingWear(Parameters):
             raise ValueError(f"expected wear_rule: exact, because a {name} is given, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
-                raise ValueError(f"{name} replaces {other}: leave out one or the other")
+                raise ValueError(f"{name} replaces {other}: leave out {name} or {other}")
         if self.dimensionless and self.last_radius is not None:
             raise ValueError(
                 "last_radius is a length: in a dimensionless campaign, give extent (last radius / a0) instead"

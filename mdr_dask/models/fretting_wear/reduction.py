@@ -109,7 +109,7 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
         times = 1.0 - numbers.level[case, position]
         messages.setdefault(
             (int(case), int(position)),
-            f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times:.9g} times that; "
+            f"expected an amplitude below mu E* d0 / G*, where gross slip begins, got {times:.9g} times this value: "
             "lower amplitude, raise friction, depth or normal_force, or give path (sliding in one direction) "
             "or history (blocks of load) instead of cycles",
         )

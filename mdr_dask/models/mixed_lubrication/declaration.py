@@ -208,8 +208,8 @@ class MixedLubrication(Parameters):
         if (one.profile is None) != (two.profile is None):
             return "expected profiles for both rollers or spectra for both, got one of each"
         if one.profile is None and self.rms_roughness is not None:
-            return "surface_1 and surface_2 replace rms_roughness: leave out one or the other"
-        return "" if self.hurst is None else "surface_1 and surface_2 replace hurst: leave out one or the other"
+            return "surface_1 and surface_2 replace rms_roughness: leave out rms_roughness, or both surfaces"
+        return "" if self.hurst is None else "surface_1 and surface_2 replace hurst: leave out hurst, or both surfaces"
 
     def _problem_of_width(self, source: Source) -> str:
         width = 2 * float(self.dry_contact(self.normal_force).half_width)

@@ -50,7 +50,7 @@ class Generated:
             wave, least = self.length / self.modes, 2 * self.length / self.points[-1]
             return f"expected a shortest wavelength of at least two point spacings, {least:.9g} m, got {wave:.9g} m"
         if isinstance(self.roughness, tuple) and not all(np.any(line) for both in self._amplitudes() for line in both):
-            return "expected waves of both surfaces between shortest_wavelength and longest_wavelength, got none in one"
+            return "expected waves between shortest_wavelength and longest_wavelength, got a surface without such waves"
         return ""
 
     def combined_rms(self) -> float:

@@ -22,8 +22,8 @@ from mdr_dask.physics.refine import Solution, refine
 #: `_OF_LENGTH`: outputs that follow from the length in intimate contact. `_OF_LINES`: outputs that need rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
-#: Outputs that can be zero, each with a floor. The error of an output that is smaller than the floor is divided by the
-#: floor. The floor of the contact length is a fraction of the width of the contact.
+#: Outputs that can be zero, each with a floor. If an output is below its floor, its absolute error is divided by the
+#: floor and not by the output. The floor of the contact length is a fraction of the width of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
 #: Parameters on which the rough lines depend. Cases have the same lines if all these parameters are equal.
 _SHARED = {

@@ -24,8 +24,9 @@ class SlidingFriction(SlidingBody):
     )
     scheme: Literal["hermite", "backward_euler"] = Field(
         default="hermite",
-        description="method that integrates the deformation along the line. hermite: exact for cubic polynomials "
-        "between the grid points. backward_euler: the time steps of the original papers, for a Kelvin body only",
+        description="method that integrates the deformation along the line. hermite: exact for a line that is a cubic "
+        "between neighbouring grid points. backward_euler: the time steps of the original papers, for a Kelvin body "
+        "only",
     )
 
 

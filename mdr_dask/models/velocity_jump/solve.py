@@ -42,8 +42,8 @@ from mdr_dask.physics.transients.elements.foundation import Foundation, foundati
 from mdr_dask.physics.transients.elements.loading_history import Piece, Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
-# Operations for block sizes, chosen by trial: of a jump, divided by nodes and time steps per decade; and of one element
-# in one time step of a history, for the spring and for each mode.
+# Numbers of operations, chosen by trial, for block sizes. A jump needs `OPERATIONS_MARCHED` times the nodes and the
+# time steps per decade. In a history, each spring and each mode needs `OPERATIONS_FOLLOWED` per element and time step.
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 100
 
 #: Names of the outputs for which errors are estimated.
@@ -277,7 +277,7 @@ class _Followed(_Group):
         return elements, (before / velocity, load / force), [piece.scaled(unit, velocity, force) for piece in history]
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a coarser grid. If `every` is 4, the grid has every fourth node of the finest grid."""
+        """Compute the case on one of the grids. If `every` is 4, the grid has every fourth node of the finest grid."""
         elements, before, history = self._history
         nodes = waves.points * self.oversampling
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
