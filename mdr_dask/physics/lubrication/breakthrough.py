@@ -19,7 +19,7 @@ from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, wh
 from mdr_dask.physics.surfaces.splines import integral, piece, shares
 
 #: Number of equal parts of a spacing between two nodes. Lengths in contact are rounded to whole numbers of parts, whose
-#: sums are exact. The length of a line of 2^30 spacings is within the range of integers.
+#: sums are exact. Even the length of a line of 2^30 spacings fits into a 64-bit integer.
 PARTS = 2**32
 
 

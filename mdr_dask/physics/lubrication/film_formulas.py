@@ -169,7 +169,7 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
 
 
 RIGID_ISOVISCOUS = 4.894968  # (h_min/R) W/U of a rigid parabola with the Reynolds exit condition (Kapitza)
-RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) of a rigid parabola with the isoviscous pressure 1/alpha (Blok)
+RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) of a rigid parabola; largest isoviscous pressure 1/alpha (Blok)
 ELASTIC_ISOVISCOUS = 2.05  # (h_min/R) M^(1/5) (2 U)^(-1/2) of soft bodies (Moes)
 
 

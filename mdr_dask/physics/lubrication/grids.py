@@ -37,7 +37,7 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return where the number of cells upstream is `wanted`. Beyond the last position, the density is constant."""
+    """Return the positions with `wanted` cells upstream. The density is constant beyond the last of the `positions`."""
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]

@@ -29,7 +29,7 @@ ORDER_OF_READINGS = 2.0  # order of convergence of other extrapolated values, wh
 ACCURACY = 1e-3  # allowed relative error of the films if no accuracy is given
 #: Attempts at the first solution of a case, chosen by trial; the second attempt is slow but hardly ever fails. Each
 #: attempt has a guess of the film, divided by the expected film; an upper limit of the guess, divided by the square of
-#: the inlet position; and the number of nodes of this solution and of those that determine the density of nodes.
+#: the inlet position; and the number of nodes of all preliminary solutions.
 ATTEMPTS = ((1.5, 0.2, 121), (2.5, 0.4, 361))
 #: `clip` of Newton's method in the first and in the second attempt on every grid, chosen by trial.
 CLIPS = (0.12, 0.06)

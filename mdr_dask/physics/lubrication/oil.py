@@ -170,5 +170,5 @@ ROELANDS_PRESSURE = 1.9609e8  # p_r of Roelands' law in Pa
 ROELANDS_LOGARITHM = 9.67  # the constant in ln eta0 + 9.67, with eta0 in Pa s
 
 
-DENSITY_RISE = 0.6e-9  # constant of the density law in 1/Pa (thesis eq. B.6)
-DENSITY_SATURATION = 1.7e-9  # constant of the density law in 1/Pa (thesis eq. B.6)
+DENSITY_RISE = 0.6e-9  # in 1/Pa; rho/rho0 = 1 + DENSITY_RISE p/(1 + DENSITY_SATURATION p) (thesis eq. B.6)
+DENSITY_SATURATION = 1.7e-9  # in 1/Pa, in the same formula

@@ -24,9 +24,10 @@ class ShiftLaw:
 
     `name` is ``power``, ``arrhenius`` or ``wlf``. `constants` contains the value and the ends of the 95 % interval of
     ``exponent``, of ``activation_energy`` (J/mol), or of ``c1`` and ``c2`` (K) at the reference temperature. `factors`
-    is the law as a function of the group, in decades. The law is zero at the anchor, the group whose measured factor is
-    zero by definition. `departures` are the measured factors minus the law, in decades. `chance` is the probability
-    that the errors of the factors would cause deviations at least as large if the law were exact.
+    converts groups (velocities or temperatures) to factors in decades by the law. The result is zero at the anchor, the
+    group whose measured factor is zero by definition. `departures` are the measured factors minus the law, in decades.
+    `chance` is the probability that the errors of the factors would cause deviations at least as large if the law were
+    exact.
     """
 
     name: str
@@ -135,7 +136,7 @@ def _fit(
     """Fit a law by generalised least squares.
 
     Return the law, in which `constants` is still empty; the values of the constants and their covariance; and the half
-    width of an interval divided by the standard error. If deviations from the law exceed the errors of the factors, an
+    width of a 95 % interval in standard errors. If deviations from the law exceed the errors of the factors, an
     additional scatter is fitted. The square of this scatter is added to the variances of the factors.
     """
     known = np.diag(covariance) > 0

@@ -16,7 +16,7 @@ from mdr_dask.physics.superposition.posterior import BEND, ROUNDING, STEP_SCATTE
 from mdr_dask.physics.superposition.sampling import CHAINS, draws
 
 EXPANSION = 6e-4
-"""Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
+"""Coefficient of volume expansion of melts and rubbers, 1/K, for the factor b_T; typical values are 5e-4 to 7e-4."""
 
 OFFSET = (0.02 / np.log(10), np.log(2))
 """Prior of the standard deviation s of vertical offsets: median of s in decades, and standard deviation of ln s.
@@ -25,7 +25,7 @@ Specimens are clamped again for each temperature, and their dimensions are known
 """
 
 FREE = (0.03, 1.5)
-"""Prior of the standard deviation of the steps of free vertical factors, in the form of `OFFSET`."""
+"""Like `OFFSET`, but for the steps from curve to curve if the vertical factors are free."""
 
 DETERMINED = 0.5
 """A step between neighbouring shifts is undetermined if its standard deviation exceeds this share of `STEP_SCATTER`."""
@@ -225,7 +225,7 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    # fit the curve to the points shifted by the mean shifts; on a plateau, the mean of the draws would miss the points
+    # fit the curve to the points shifted by the mean shifts; on a plateau, the mean drawn curve would miss these points
     likeliest = solve(problem, rows.mean(axis=0)[None]).mean
     curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
     curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0
@@ -283,8 +283,8 @@ def rereference(
 ) -> Superposition:
     """Return the same master curve for a new reference, which is a group or a value between two groups.
 
-    The horizontal factor at the new reference is the factor of the law plus a deviation from the law, interpolated
-    linearly between the deviations of the measured factors at the two neighbouring groups. To include the error of this
+    The horizontal factor at the new reference is the factor of the law plus a deviation from the law. The deviation is
+    interpolated linearly between the measured deviations at the two neighbouring groups. To include the error of this
     interpolation (see `interpolation_error`), a normally distributed number, with this error as standard deviation, is
     added to each draw.
 

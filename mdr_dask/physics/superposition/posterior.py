@@ -30,10 +30,10 @@ CELLS = 8
 """Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
 
 ROUNDING = 1e-5
-"""Smallest scatter of a curve, decades: the rounding of a table with five digits."""
+"""Smallest scatter of a curve, decades: the rounding error of a table with five digits."""
 
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
-"""Prior standard deviations, in widths of a curve: of the mean step between shifts, and of steps about this mean."""
+"""Prior standard deviations, in curve widths, of the mean step between shifts and of the steps about this mean."""
 
 BEND, NOISE = 0.02, 0.01
 """Prior medians of the bend near each curve, in heights of a curve, and of the relative scatter of each channel.
@@ -42,7 +42,7 @@ The bend is the standard deviation of the second differences of the spline.
 """
 
 SCALE_SCATTER = 3.0
-"""Prior standard deviation of ln(bend) and ln(scatter), which may thus be 400 times above or below their medians.
+"""Prior standard deviation of ln(bend) and ln(scatter); two standard deviations are a factor of 400.
 
 The logarithm of the bend changes by about 1 from one curve to the next, because a master curve is bent in some places
 only.
@@ -52,7 +52,7 @@ REACH = 0.3
 """Distance over which the bend changes from one curve to the next, in widths of a curve."""
 
 TREND = 10.0
-"""Prior standard deviation of the mean step of drifting offsets, divided by that of the deviations from this mean."""
+"""Ratio of the prior standard deviations of the mean step of drifting offsets and of the steps about this mean."""
 
 FARTHEST = 8.0
 """Largest distance of ln(bend), ln(noise) or ln(offset scatter) from its prior median. This prevents overflow."""
@@ -99,7 +99,7 @@ class Curves:
 
     @cached_property
     def tied(self) -> FloatArray:
-        """Prior precision of the vertical offsets if the standard deviation of the offsets (or of their steps) is 1."""
+        """Inverse prior covariance of vertical offsets that have (or whose steps have) a standard deviation of 1."""
         if not self.drifting:
             return np.eye(self.count)
         steps = np.eye(self.count) - np.eye(self.count, k=-1)
@@ -109,7 +109,7 @@ class Curves:
 
     @cached_property
     def prior(self) -> tuple[FloatArray, FloatArray]:
-        """Prior mean and precision of all parameters.
+        """Prior mean and inverse prior covariance of all parameters.
 
         The parameters are: the shifts of all curves except the first, in widths of a curve; for each channel, the
         logarithms of the bend near each curve (see `BEND`); the logarithm of the noise of each channel; and, if there
@@ -162,10 +162,10 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     The unknowns of a row are the spline coefficients of all channels and the offsets. Their precision matrix is
 
         [ A    B ]
-        [ B^T  D ],
+        [ B^T  D ].
 
-    with G = A^-1 B, the covariance C = (D - B^T G)^-1 of the offsets, and the covariance A^-1 + G C G^T of the
-    coefficients. Four splines overlap at a point; therefore A is banded. The matrices A of all rows are the diagonal
+    With G = A^-1 B, the offsets have the covariance C = (D - B^T G)^-1, and the coefficients have the covariance
+    A^-1 + G C G^T. Four splines overlap at a point; therefore A is banded. The matrices A of all rows are the diagonal
     blocks of one banded matrix, which is factorised into U^T U. Banded matrices M are stored by diagonals:
     ``band[d, k]`` is M[k - d, k].
 
@@ -218,7 +218,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
         corner = tied + np.sum(weight, axis=1)[:, None, None] * np.diag(np.bincount(curves.member))
     try:
         factor = cholesky_banded(band[::-1], check_finite=False)
-    except LinAlgError:  # a chain diverges; rounding error below 20 eps: 7 entries per row, 5 errors of eps / 2 each
+    except LinAlgError:  # a chain diverges; 7 entries per row, each with 5 rounding errors of eps / 2: below 20 eps
         band[0] *= 1 + 20 * np.finfo(np.float64).eps
         factor = cholesky_banded(band[::-1], check_finite=False)
     half = dtbtrs(factor, sides, trans="T")[0]  # M = U^-T B; B^T A^-1 B, computed as M^T M, loses fewer digits

@@ -16,9 +16,9 @@ HOPS = 2
 """Number of jumps after each move; a jump changes the step between two neighbouring curves. Chosen by trial."""
 
 CHAINS, KEPT = 24, 20
-"""Number of chains, and number of moves of each chain that are kept. The same number of earlier moves is discarded.
+"""Number of chains, and number of moves of each chain that are kept. Earlier moves, at least as many, are discarded.
 
-480 draws determine the ends of a 95 % interval to about 5 %.
+The 480 draws determine the ends of a 95 % interval to about 6 % of its half width.
 """
 
 CONVERGED = 1.1

@@ -187,7 +187,8 @@ class MapSpectrum:
 
         The second and the fourth angular harmonic are means over all waves that are not only noise. The weights are
         the contributions of the waves to the mean square of either the height or the gradient. The anisotropy is the
-        largest of these four means. The square that scatter alone would exceed with a probability of 5 % is subtracted.
+        largest of these four means. First, the square of each mean is reduced by the value that scatter alone would
+        exceed with a probability of 5 %.
         """
         there = self.wavenumber <= noise_limit(self.binned())
         found, power = [], self.density[there] * self.wavenumber[there]

@@ -1,4 +1,4 @@
-"""Self-affine rough lines: spectra with a given rms height, phases from a counter-based random stream."""
+"""Self-affine rough lines: amplitudes for an rms height of 1, and phases from a counter-based random stream."""
 
 from __future__ import annotations
 

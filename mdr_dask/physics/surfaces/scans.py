@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BEND = 3.0  # prior standard deviation of the change of the slope d log C2D / d log q between adjacent bins
-STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value; chosen by trial, far above roughness
+STEEPEST = 30.0  # the spectrum ends at a steeper fall -d log C / d log q; chosen by trial, much steeper than roughness
 
 
 class Cut(NamedTuple):

@@ -27,7 +27,7 @@ class Interval(NamedTuple):
 
 
 class SelfAffine(NamedTuple):
-    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None for a wavelength at which there is no cut-off."""
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m. A wavelength without cut-off is None."""
 
     hurst: Interval
     longest: Interval | None

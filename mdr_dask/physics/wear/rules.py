@@ -29,8 +29,8 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-#: Ratio of the widths of successive pieces of integration at the stick border, chosen by trial. Beyond two such pieces,
-#: the deviation of the logistic law from its limit is below 1/900.
+#: Each piece of integration ends this many times farther from the stick border than the piece before (by trial).
+#: Beyond the last piece, at 900 widths of the first, the logistic law deviates from its limit by less than 1/900.
 LAYER_GROWTH = 30.0
 ERROR = 2e-6  # numerical error of every output, divided by its largest value; without the error of the fast rule itself
 
@@ -95,7 +95,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = 0.8) 
 
 
 def _scar(profile: Profile, c: float, rest: float) -> Scar:
-    """Return the scar by the fast rule, or the scar of the limiting profile if `rest` is 0. The scar radius is NaN."""
+    """Return the scar of the fast rule, or of the limiting profile if `rest` is 0. Its radius is NaN (see `closed`)."""
     check_stick_radius(c)
     eta = float(profile.rise(np.array(1.0 - c), c))
 

@@ -170,8 +170,7 @@ class PartialSlip:
         return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.panels.nodes.size))
 
     def under_force(self, virgin: SlipMoment) -> tuple[PartialSlip, SlipMoment]:
-        """Return this problem with constant force instead of constant depth, and the contact with which the new problem
-        starts.
+        """Return the problem with constant force instead of constant depth, and the contact with which it starts.
 
         `virgin` is the virgin contact as a solution of the discrete equations.
         """

@@ -67,7 +67,7 @@ class Worn:
     def error(self, output: str, places: FloatArray) -> FloatArray:
         """Return the expected absolute error of an attribute, or NaN where the value is not finite.
 
-        The error of a function is one number, the largest difference between the solutions along the function.
+        The error of a function is one number. It follows from the largest difference between the solutions.
         """
         value = np.asarray(self.value(output, places))
         if self.rougher:
