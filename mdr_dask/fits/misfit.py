@@ -54,11 +54,15 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
     probability, along = trend(residuals.scaled, conditions)
     if np.isnan(probability) or residuals.freedom < 4:  # a trend is a parabola with three constants
         return f"not tested: {residuals.scaled.size} points without known errors are too few; {size}"
-    if probability < DOUBTFUL and residuals.relative > WITHIN:
-        return f"no: the residuals have a trend along {along} (by chance with probability {probability:.1g}); {size}"
+    is_trend = probability < DOUBTFUL
+    about = f"(by chance with probability {probability:.2g}); {size}"
+    if is_trend and residuals.relative > WITHIN:
+        return f"no: the residuals have a trend along {along} {about}"
     if residuals.errors > APPROXIMATE:
         return hidden
-    return f"yes: the residuals have no significant trend (by chance with probability {probability:.2g}); {size}"
+    if is_trend:
+        return f"yes: the residuals have a trend along {along} {about}, which is less than {100 * WITHIN:g} %"
+    return f"yes: the residuals have no significant trend {about}"
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
