@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from mdr_dask import aggregation, bootstrap
-from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.measured import SAME, Measured, belonging
+from mdr_dask.arrays import SAME, FloatArray
+from mdr_dask.campaign.measured import Measured, belonging
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown
