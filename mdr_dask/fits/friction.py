@@ -166,7 +166,9 @@ def _plateau(data: xr.Dataset) -> Variables:
         **height,
         **measure("plateau_stated", math.sqrt(2), "sqrt 2, the plateau by eq. 3.15"),
         **measure(
-            "decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {WITHIN:.0%} of plateau"
+            "decades",
+            float(np.ptp(x[flat]) / np.log(10)),
+            f"decades of velocity with mu within {WITHIN:.0%} of the plateau",
         ),
         **measure("reached", reached, "whether friction reaches its maximum within the range of velocities"),
         **_root_two(data, found.height, known[flat], count, reached),

@@ -81,7 +81,7 @@ def _indenter(data: xr.Dataset) -> Variables:
     xi, within = table.columns
     known = (table.mean() > 0) & np.isfinite(xi) & (xi > 0)
     used = (within > 0) & known
-    measured = measure("cases", int(used.sum()), "number of cases within the law")
+    measured = measure("cases", int(used.sum()), "number of cases to which the law applies")
     if np.count_nonzero(used) < 3:
         errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
         names = ["exponent", "exponent_low", "exponent_high", *errors]

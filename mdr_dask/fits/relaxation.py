@@ -43,7 +43,7 @@ TRACE = "friction_coefficient"
 #: Constants that describe the relaxation of a case: the unit and the meaning of each constant.
 FIELDS = {
     "rate": ("1", "rate b of one exponential exp(-b t') with t' = (t - t_0) / tau (eq. 4.5)"),
-    "integral_rate": ("1", "mu - mu_2 just after t_0, divided by its integral over t': a rate without a model"),
+    "integral_rate": ("1", "mu - mu_2 just after t_0, divided by its integral over t': a rate that needs no law"),
     "relaxation_duration": ("s", "tau / b: time in which mu - mu_2 decreases by the factor e"),
     "relaxation_length": ("m", "v_2 tau / b: slip length D_c of rate-and-state laws"),
 }

@@ -108,7 +108,7 @@ class FrettingWear(Parameters):
 
     renamed: ClassVar[Mapping[str, str]] = {
         "shape": "write indenter: {shape: ...}, with radius, angle, coefficient and exponent inside",
-        "measured": "write measured: {table: ...} beside parameters, and fit calibration",
+        "measured": "write measured: {table: ...} beside parameters, and run mdr-dask fit STORE calibration",
         "method": "write wear_rule: exact, fast or limit; exact is the default",
         "tolerance": "write accuracy beside parameters, the relative error of every output",
         "accuracy": "write accuracy beside parameters, the relative error of every output",
@@ -238,7 +238,7 @@ class FrettingWear(Parameters):
             )
         if isinstance(self.indenter, Table) and self.depth is None:
             raise ValueError(
-                "a table of a profile needs the depth in metres: give depth instead of normal_force or stick_radius"
+                "a table of a profile needs the indentation depth: give depth instead of normal_force or stick_radius"
             )
         if self.wear_rule == "fast" and self.hold == "force":
             raise ValueError(FAST_AT_DEPTH)
