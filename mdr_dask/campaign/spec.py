@@ -11,10 +11,14 @@ from mdr_dask.campaign.document import LARGEST
 from mdr_dask.models.base import Parameters, Whole, quantity
 from mdr_dask.models.data_file import NamedFile
 
+_LONGEST_NAME = 100  # file systems allow 255 bytes, and endings are added to the name
+
 
 def _usable_as_file_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) or name.endswith("."):
         raise ValueError(f"expected a file name of letters, digits, '-', '_' and '.', got {name!r}")
+    if len(name) > _LONGEST_NAME:
+        raise ValueError(f"expected a file name with at most {_LONGEST_NAME} characters, got {len(name)}")
     if name.endswith((".partial", ".json")):
         raise ValueError(f"expected a file name with another ending, got {name!r}")
     return name
