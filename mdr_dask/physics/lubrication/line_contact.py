@@ -244,7 +244,7 @@ def solve_film(
     if outcome != Outcome.CONVERGED:
         return _no_solution(case, outcome, source)
     solved: list[GridSolution] = []
-    # central and minimum film get the larger of the two relative errors, because two grids may agree by chance on one
+    # both films get the larger of their two relative errors, because two grids may agree on one of them by chance
     scales = np.array([source.central_film, source.minimum])
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum]) / scales, *readings]
 

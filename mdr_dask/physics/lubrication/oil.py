@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 
-_LUBRICANT_EXPANSION = 0.6278  # expansion in 1/K times density in kg/m^3, both at 60 F (ASTM D1250, table 54D)
+_LUBRICANT_EXPANSION = 0.6278  # coefficient of expansion in 1/K times density in kg/m^3 at 60 F (ASTM D1250, table 54D)
 
 #: Pairs (s, t) of Gold's correlation ``alpha = s nu^t 1e-9``, with nu in mm^2/s, for each kind of oil.
 #: Only the pair for mineral oils could be confirmed (see docs/evidence/mixed-lubrication.md).

@@ -25,7 +25,7 @@ Specimens are clamped again for each temperature, and their dimensions are known
 """
 
 FREE = (0.03, 1.5)
-"""Like `OFFSET`, but for the steps from curve to curve if the vertical factors are free."""
+"""Like `OFFSET`, but for the steps of free vertical factors from one curve to the next."""
 
 DETERMINED = 0.5
 """A step between neighbouring shifts is undetermined if its standard deviation exceeds this share of `STEP_SCATTER`."""

@@ -44,8 +44,8 @@ The bend is the standard deviation of the second differences of the spline.
 SCALE_SCATTER = 3.0
 """Prior standard deviation of ln(bend) and ln(scatter); two standard deviations are a factor of 400.
 
-The logarithm of the bend changes by about 1 from one curve to the next, because a master curve is bent in some places
-only.
+The logarithm of the bend is assumed to change by about 1 from one curve to the next, because a master curve is bent in
+some places only.
 """
 
 REACH = 0.3
@@ -190,7 +190,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     bend = near @ share.swapaxes(1, 2)
     weight = 1 / (noise**2 + ROUNDING**2)
 
-    # the data of a channel are its points, and a zero for each second difference of its spline coefficients
+    # besides its points, a channel has a datum for each second difference of its spline coefficients: the value 0
     bent = np.array([[1.0, -2.0, 1.0, 0.0]] * (splines - 3) + [[0.0, 1.0, -2.0, 1.0]])
     first = np.hstack([first, np.tile(np.minimum(np.arange(splines - 2), splines - ORDER), (many, 1))])
     value = np.concatenate([value, np.tile(bent, (many, 1, 1))], axis=1)[:, None]
@@ -218,8 +218,8 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
         corner = tied + np.sum(weight, axis=1)[:, None, None] * np.diag(np.bincount(curves.member))
     try:
         factor = cholesky_banded(band[::-1], check_finite=False)
-    except LinAlgError:  # a chain diverges; 7 entries per row, each with 5 rounding errors of eps / 2: below 20 eps
-        band[0] *= 1 + 20 * np.finfo(np.float64).eps
+    except LinAlgError:  # a chain diverges, and the matrix is not positive definite because of rounding
+        band[0] *= 1 + 20 * np.finfo(np.float64).eps  # a row has 7 entries, each with 5 rounding errors of eps / 2
         factor = cholesky_banded(band[::-1], check_finite=False)
     half = dtbtrs(factor, sides, trans="T")[0]  # M = U^-T B; B^T A^-1 B, computed as M^T M, loses fewer digits
     half, solved = (each.reshape(many, channels * splines, 1 + offsets) for each in (half, dtbtrs(factor, half)[0]))
@@ -230,7 +230,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     mean, found = (alone - gain @ found)[..., 0], found[..., 0]
     log_determinant = 2 * np.sum(np.log(factor[-1]).reshape(many, -1), axis=1) + np.linalg.slogdet(corner)[1]
 
-    # covariance of the coefficients near its diagonal, and minus the covariance of coefficients and offsets
+    # band of the covariance of the coefficients, and the negative covariance of coefficients and offsets
     within, cross = _inverse_band(factor[::-1]).reshape(ORDER, many, -1), gain @ covariance
     for d in range(ORDER):
         within[d, :, d:] += np.vecdot(cross[:, d:], gain[:, : gain.shape[1] - d])

@@ -16,7 +16,7 @@ HOPS = 2
 """Number of jumps after each move; a jump changes the step between two neighbouring curves. Chosen by trial."""
 
 CHAINS, KEPT = 24, 20
-"""Number of chains, and number of moves of each chain that are kept. Earlier moves, at least as many, are discarded.
+"""Number of chains, and number of moves of each chain that are kept. At least as many earlier moves are discarded.
 
 The 480 draws determine the ends of a 95 % interval to about 6 % of its half width.
 """
@@ -44,7 +44,7 @@ def first_guess(curves: Curves) -> FloatArray:
         two = replace(curves, x=aligned, y=curves.y[:, pair], member=member, count=2, splines=3 * CELLS + 3)
         width, channels = float(np.ptp(aligned)), curves.y.shape[0]
         rows = np.column_stack([steps * width, np.tile(two.prior[0][1:], (steps.size, 1))])
-        # the best step may lie between two tried steps; the noise is at least as large as the resulting error of y
+        # the best step may lie between two tried steps; the noise is therefore at least the resulting error of y
         coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
         noise = slice(1 + 2 * channels, 1 + 3 * channels)
         rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
@@ -67,7 +67,7 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
 
 @np.errstate(over="ignore", invalid="ignore")  # moves that diverge are rejected
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
-    """Return the curves, with `splines` set to the number that was used, and a row of parameters for each draw."""
+    """Return the curves, with the number of `splines` that was used, and a row of parameters for each draw."""
     shifts = first_guess(curves)
     curves = laid_out(curves, shifts)
     start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
@@ -137,7 +137,7 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """In each row, draw one step again from its prior; return the new rows and the rise of the prior energy.
+    """In each row, draw one step again from its prior; return the new rows and the decrease of the log prior.
 
     A step is the difference between the shifts of two neighbouring curves. On a plateau the density has many small
     maxima; with jumps, a chain passes from one maximum to another.

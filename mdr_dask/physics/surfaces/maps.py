@@ -185,10 +185,10 @@ class MapSpectrum:
     def anisotropy(self) -> float:
         """Return the anisotropy: 0 for an isotropic surface, 1 if all waves have one direction.
 
-        The second and the fourth angular harmonic are means over all waves that are not only noise. The weights are
-        the contributions of the waves to the mean square of either the height or the gradient. The anisotropy is the
-        largest of these four means. First, the square of each mean is reduced by the value that scatter alone would
-        exceed with a probability of 5 %.
+        The second and the fourth angular harmonic are averaged over all wave numbers at which the roughness exceeds the
+        noise. The weights are the contributions to the mean square of the height or of the gradient. The square of each
+        of these four averages is reduced by the value that scatter alone would exceed with a probability of 5 %. The
+        anisotropy is the square root of the largest result.
         """
         there = self.wavenumber <= noise_limit(self.binned())
         found, power = [], self.density[there] * self.wavenumber[there]
@@ -200,7 +200,7 @@ class MapSpectrum:
 
 
 def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
-    """Return the spectrum of a map without missing points and without trend.
+    """Return the spectrum of a map that has no missing points and no trend.
 
     If `hann` is true, the map is multiplied by the window `hann_disc`. A periodic map needs no window.
     """

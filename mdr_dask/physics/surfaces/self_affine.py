@@ -27,7 +27,7 @@ class Interval(NamedTuple):
 
 
 class SelfAffine(NamedTuple):
-    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m. A wavelength without cut-off is None."""
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m. A wavelength is None if there is no cut-off."""
 
     hurst: Interval
     longest: Interval | None

@@ -1,7 +1,7 @@
 """A closed line as a cubic spline with one coefficient for each of its equidistant nodes.
 
 Between two nodes, with t from 0 to 1, the line is ``a0 + a1 t + a2 t^2 + a3 t^3``. It lies between the smallest and the
-largest of four spline coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
+largest of the four spline coefficients used by `piece` (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations

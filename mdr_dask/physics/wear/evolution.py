@@ -129,7 +129,7 @@ class _Newton:
     def _iterate(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
     ) -> FloatArray | None:
-        """Return the solution, or None if the changes grow, or shrink slowly because the Jacobian is reused."""
+        """Return the solution, or None if the changes grow, or if they shrink too slowly with a reused Jacobian."""
         is_reused, last = self.factors is not None, np.inf
         while True:
             residual = self.problem.residual(unknowns, theta, known(unknowns))

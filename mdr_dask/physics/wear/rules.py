@@ -30,7 +30,7 @@ from mdr_dask.physics.wear.worn import (
 )
 
 #: Each piece of integration ends this many times farther from the stick border than the piece before (by trial).
-#: Beyond the last piece, at 900 widths of the first, the logistic law deviates from its limit by less than 1/900.
+#: Beyond 900 widths of the first piece, the logistic law deviates from its limit by less than 1/900.
 LAYER_GROWTH = 30.0
 ERROR = 2e-6  # numerical error of every output, divided by its largest value; without the error of the fast rule itself
 

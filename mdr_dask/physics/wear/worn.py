@@ -268,7 +268,7 @@ def beyond_table(profile: Profile, stick_radius: float) -> ValueError:
 
 
 def virgin_load(profile: Profile, radius: float) -> float:
-    """Return the integral of 1 - g0 from 0 to c = `radius`. With x = c t^4, a power law becomes smooth at the axis."""
+    """Return the integral of 1 - g0 from 0 to c = `radius`. The substitution x = c t^4 makes power laws smooth."""
     abscissa, weight = gauss(64)
     return 4.0 * radius * float(((1.0 - profile.image(radius * abscissa**4)) * abscissa**3) @ weight)
 
