@@ -21,8 +21,8 @@ from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
 #: Least width of an interval, as a fraction of the axis. This width limits the number of values at a discontinuity.
 FINEST = 2.0**-10
-#: Intervals are always halved until one end has at least this level: 1 is the middle of the axis, 2 are its quarters,
-#: and 3 its eighths. The quarters are predicted from only three values, and the prediction may be right by chance.
+#: Intervals are always halved until one end has at least this level. Level 1 is the middle of the axis, level 2 the
+#: quarters, and level 3 the eighths. The quarters are predicted from only three values, perhaps correctly by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
 #: the end that was added to the axis later, as fractions of the length of the interval. Chosen by trial.
@@ -40,7 +40,7 @@ class Mean(NamedTuple):
 
     @classmethod
     def of(cls, values: FloatArray, done: BoolArray, error: FloatArray | None) -> Mean:
-        """Return the means over the realisations (last axis), using only the results that are done."""
+        """Return the means over the realisations (last axis) of the results that the mask `done` selects."""
         number = np.arange(values.shape[-1]) % min(GROUPS, values.shape[-1])
         kept = [done, *(done & (number != group) for group in range(number.max() + 1))]
         mean = _mean(values, done)

@@ -354,7 +354,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint with a unit in `COMMON` that is similar to a word, and has the dimension of `unit` if given."""
+    """Return a hint with a similar unit in `COMMON`. If `unit` is given, the similar unit must have its dimension."""
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"

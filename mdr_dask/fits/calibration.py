@@ -140,8 +140,8 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     The prior of an unknown is uniform over the axis of the unknown. If the axis is spaced logarithmically, the prior is
     uniform over the logarithm of the unknown. The measured values are assumed to be normally distributed about the
     prediction. The covariance of the measured values has three parts: measurement errors; scatter of the rough lines,
-    common to all points; and errors of grid and interpolation. Half of each error of grid and interpolation is common
-    to all points. The remaining half is independent for each point.
+    common to all points; and errors of grid and interpolation. The error of grid and interpolation of a point is the
+    sum of two equal parts: one part is common to all points, and the other part is independent for each point.
 
     If the table contains no measurement errors, the logarithm of the size of the measurement errors has a uniform
     prior. The measurement errors are then assumed to be either equal for all points, or proportional to the predicted

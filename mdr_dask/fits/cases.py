@@ -1,4 +1,4 @@
-"""Functions for many fits: arrays of the cases of a series, fits of laws to these arrays, and result variables.
+"""Functions that many fits use: collect the cases of a series in arrays, fit laws to them, make result variables.
 
 For stacks, see `mdr_dask.bootstrap`.
 """

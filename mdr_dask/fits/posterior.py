@@ -31,7 +31,7 @@ REACH = 14.0
 #: divided cells with their probabilities as weights. Chosen by trial.
 SMOOTH = 0.6
 #: An end of the axis of an unknown is *open* if ln(largest posterior density / density at the end) is less than `OPEN`:
-#: the 95 % interval by the ratio of likelihoods reaches this end.
+#: the 95 % interval of the likelihood-ratio test reaches this end.
 OPEN = float(chdtri(1, 1 - CONFIDENCE)) / 2
 #: The data determine a product if the spread of its logarithm is less than this fraction of the spread in the prior.
 #: Chosen by trial.

@@ -89,7 +89,7 @@ class LoadStep(Parameters):
         "1", "amplitude in the block divided by the amplitude of the campaign", gt=0, default=1.0
     )
     load_factor: float = quantity(
-        "1", "depth or force that is held in the block, divided by its value before wear", gt=0, default=1.0
+        "1", "depth or force that is kept constant in the block, divided by its value before wear", gt=0, default=1.0
     )
 
 

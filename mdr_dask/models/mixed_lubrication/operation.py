@@ -77,7 +77,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
     accuracy = accuracy or ACCURACY
 
     def smooth(share: float) -> LineContact:
-        """Return the smooth contact with this share of the load and of the modulus (see `load_sharing`)."""
+        """Return the smooth contact with load and modulus multiplied by `share` (see `load_sharing`)."""
         numbers, modulus = (W, U / share, G * share), case.contact_modulus * share
         return line_contact(numbers, modulus, viscosity_law=case.viscosity_law, viscosity=viscosity)
 
@@ -113,7 +113,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
 
 
 def _asperity_share(case: MixedLubrication, rms: float, film: float) -> float:
-    """Return the load on the asperities at a film in m, divided by the normal force."""
+    """Return the load on the asperities, divided by the normal force; `film` is the film thickness in m."""
     width = 2 * float(case.dry_contact(case.normal_force).half_width)
     pressure = asperity_pressure(film, rms, case.longest(), case.contact_modulus)
     return pressure / (case.normal_force / (width * case.roller_width))
