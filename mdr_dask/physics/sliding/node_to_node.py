@@ -254,7 +254,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
             height[place], slope[place] = value, rate / refinement
 
 
-ITERATIONS = 25  # largest number of sweeps, chosen by trial; a case without a solution on a coarse grid needs all
+ITERATIONS = 25  # largest number of sweeps, chosen by trial; a case without a solution on a coarse grid uses all
 COARSENING, COARSEST = 4, 64  # chosen by trial; the search starts on a grid of at most COARSENING * COARSEST nodes
 LANES = 64  # number of cases that are computed together, chosen by trial
 RESOLVED = 10  # chosen by trial; a grid is fine enough only if at least this number of cells is in contact
