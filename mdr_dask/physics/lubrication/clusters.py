@@ -57,7 +57,7 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
 
 @jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
-    """Write the positions at which a spline changes sign to `found`, and return the number of these positions."""
+    """Write to `found` the positions at which a spline changes sign, and return the number of these positions."""
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):

@@ -165,7 +165,7 @@ def balance(
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
-    """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`."""
+    """Write to `row` the derivatives of the imbalance of volume i with respect to all pressures."""
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
@@ -226,7 +226,7 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Write the right side of the equations for a step with a reused Jacobian to `b`.
+    """Write to `b` the right side of the equations for a step with a reused Jacobian.
 
     The pressures at all inactive nodes must be zero.
     """

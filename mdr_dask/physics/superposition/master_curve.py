@@ -225,7 +225,7 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    # fit the curve to the points shifted by the mean shifts; on a plateau, the mean drawn curve would miss these points
+    # fit the curve to the points shifted by the mean shifts; on a plateau, the mean of drawn curves would miss them
     likeliest = solve(problem, rows.mean(axis=0)[None]).mean
     curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
     curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0

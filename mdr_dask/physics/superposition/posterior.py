@@ -65,9 +65,9 @@ class Curves:
     `member` is the index of the curve of each point, and `height` is the median height of a curve in each channel.
     `splines` is the number of spline coefficients of each channel. `offset` describes the prior of the standard
     deviation s of the vertical offsets: the median of s in decades, and the standard deviation of ln s. Without
-    offsets, `offset` is None. If `drifting` is True, the offsets change from curve to curve by steps. A step is a mean
-    step plus a scatter. The prior standard deviation of the mean step is `TREND` times the standard deviation of the
-    scatter.
+    offsets, `offset` is None. If `drifting` is True, the offsets change from curve to curve by steps. A step is the
+    sum of a mean, common to all steps, and a scatter. The prior standard deviation of the mean is `TREND` times that of
+    the scatter.
     """
 
     x: FloatArray
@@ -99,7 +99,7 @@ class Curves:
 
     @cached_property
     def tied(self) -> FloatArray:
-        """Inverse prior covariance of vertical offsets that have (or whose steps have) a standard deviation of 1."""
+        """Inverse prior covariance of the vertical offsets, for offsets or steps with a standard deviation of 1."""
         if not self.drifting:
             return np.eye(self.count)
         steps = np.eye(self.count) - np.eye(self.count, k=-1)

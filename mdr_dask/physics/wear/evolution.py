@@ -170,7 +170,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return weights of values at `times` that give the derivative at times[0] of the interpolating polynomial."""
+    """Return the weights with which values at `times` give the slope of their interpolating polynomial at times[0]."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -183,7 +183,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return weights of values at `times` that give the value at `time` of the interpolating polynomial."""
+    """Return the weights with which values at `times` give the value of their interpolating polynomial at `time`."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

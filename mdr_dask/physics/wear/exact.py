@@ -151,7 +151,7 @@ def exact(
 def operations(accuracy: float, *, constant_force: bool) -> float:
     """Return the approximate number of operations in partial slip, with n^3 operations per time step for n nodes."""
     resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force else COARSEST))
-    # time steps that grow by the factor `GROWTH`, plus time steps whose length an error of third order limits
+    # time steps that grow by the factor `GROWTH`, plus time steps of a length limited by an error of third order
     steps = float(np.log(1.0 / resolution.step) / np.log(GROWTH) + resolution.step**-0.25)
     return (2.0 if constant_force else 1.0) * steps * resolution.panels(5 if constant_force else 2).nodes.size ** 3
 
