@@ -39,9 +39,10 @@ class Commands(click.Group):
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each command of a group with one line of help, and then the names of all other commands."""
+        limit = formatter.width - 6 - max(map(len, self.commands))  # as in click.Group
         for title, names in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(formatter.width)) for name in names])
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(limit)) for name in names])
         others = [name for name in sorted(self.commands) if not any(name in names for names in GROUPS.values())]
         with formatter.section("more"):
             formatter.write_text(f"{', '.join(others)}; each with --help")
