@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import dask
+import distributed  # noqa: F401  (its defaults must be loaded before a test changes a setting)
 import psutil
 import pytest
 from test_execute import digests, run, values
