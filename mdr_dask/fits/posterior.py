@@ -21,7 +21,7 @@ from mdr_dask.fits.prediction import Predicted, Prediction
 
 #: Number of cells before refinement, and smallest number of cells that a refinement divides. Chosen by trial: with
 #: fewer cells, a refinement may miss a narrow maximum.
-CELLS = 1024
+CELLS = 512
 #: Largest number of cells after a refinement; limits the time.
 MOST = 160_000
 #: Cells are left out if ln(density) is below its maximum by more than this value. The total probability of these cells
