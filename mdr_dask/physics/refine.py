@@ -28,7 +28,7 @@ SAFETY = 3.0
 """Roache's safety factor for an estimate from two grids."""
 
 MOST_ITERATIONS = 100
-"""Largest number of steps in a search for a root. Fewer bisections reach the accuracy of floating-point numbers."""
+"""Largest number of steps in a search for a root. As many bisections give more than floating-point accuracy."""
 
 EPS = float(np.finfo(np.float64).eps)
 """Relative rounding error of floating-point numbers."""
@@ -123,7 +123,7 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change[:requested].max(axis=0, initial=0.0), change.shape)
-        # if a case had no solution on an earlier grid, `before` is infinite, and the second expression is set to 0
+        # if a case had no solution on an earlier grid, `before` is infinite, and only Richardson's estimate is used
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
         solved = fine.outcome == Outcome.CONVERGED

@@ -1,6 +1,6 @@
-"""Closed forms for contacts of bodies f = A r^n with the effective normal and tangential moduli E_star and G_star.
+"""Closed forms for normal contacts of bodies with the profile f = A r^n and the effective modulus E_star.
 
-The bodies are elastically similar, so that the normal and the tangential problem are independent.
+The factor kappa_n is `power_factor(n)`. The bodies are elastically similar, so that tangential forces have no effect.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mdr_dask.physics.mdr.transforms import power_factor
 
 
 def contact_radius(depth: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return the contact radius a = (d / (kappa_n A))^(1/n), which solves g(a) = d (thesis eq. 2.8)."""
+    """Return the contact radius a = (d / (kappa_n A))^(1/n) with kappa_n from `power_factor` (thesis eq. 2.8)."""
     ratio = np.asarray(depth, dtype=float) / (power_factor(exponent) * np.asarray(amplitude))
     return np.asarray(ratio ** (1.0 / np.asarray(exponent, dtype=float)))
 

@@ -21,7 +21,7 @@ from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 
 @dataclass(frozen=True)
 class PowerProfile:
-    """The power law g0 = x^n and f0 = r^n / kappa_n, with n > 0: a cone for n = 1, a parabola for n = 2."""
+    """The power law g0 = x^n and f0 = r^n / `power_factor(n)`, with n > 0: a cone for n = 1, a parabola for n = 2."""
 
     exponent: float
     largest_radius: float = np.inf
@@ -31,7 +31,7 @@ class PowerProfile:
             raise ValueError(f"the exponent of a profile must be positive and finite, got {self.exponent!r}")
 
     def height(self, radius: FloatArray) -> FloatArray:
-        """Return f0(r) = r^n / kappa_n."""
+        """Return f0(r) = r^n / `power_factor(n)`."""
         return np.asarray(radius**self.exponent / power_factor(self.exponent))
 
     def image(self, position: FloatArray) -> FloatArray:

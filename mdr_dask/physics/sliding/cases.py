@@ -37,7 +37,7 @@ def first_depths(loads: FloatArray) -> FloatArray:
 
 
 def strides(nodes: int) -> list[int]:
-    """Return strides. The depth is searched on grids with every stride-th node, from coarse to fine (stride 1)."""
+    """Return the strides of the grids on which the depth is searched, from coarse to fine (stride 1: every node)."""
     found = [1]
     while nodes > COARSENING**2 * found[-1]:
         found.append(found[-1] * COARSENING)

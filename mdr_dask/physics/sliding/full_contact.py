@@ -39,7 +39,7 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     # drag: mean of pressure times slope; the static pressure adds no drag, as the mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    # if contact is not full, this mostly shows at a node of extreme slope, or of extreme pressure without the dashpot
+    # first test only the nodes with extreme slope or extreme pressure (without the dashpot); the loop tests all nodes
     worst = [pressure.argmin(), pressure.argmax(), slope.argmin(), slope.argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch

@@ -20,7 +20,7 @@ from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # number of cells in a block, chosen by trial; a block entirely in contact or free is one step of a sweep
-TINY = float(np.finfo(np.float64).tiny)  # smallest normal number; smaller displacements are set to 0
+TINY = float(np.finfo(np.float64).tiny)  # smallest normal floating-point number; smaller displacements become 0
 
 # Indices of the `sums` of a sweep, and the number of these sums
 DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE, SUMS = range(8)

@@ -137,7 +137,7 @@ def _write_nodes(
 
 @jit
 def _write_periodic(values: FloatArray, first: int, stride: int, written: FloatArray) -> None:
-    """Write every `stride`-th value of the period from `first` on, and `BEFORE` values before and `AFTER` after it."""
+    """Write every `stride`-th value of one period from `first` on, with `BEFORE` values in front and `AFTER` behind."""
     n, place = written.size - BEFORE - AFTER, first
     for i in range(BEFORE, BEFORE + n):
         written[i] = values[place]
@@ -254,7 +254,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
             height[place], slope[place] = value, rate / refinement
 
 
-ITERATIONS = 25  # largest number of sweeps, chosen by trial; a case without a solution on a coarse grid uses all
+ITERATIONS = 25  # largest number of sweeps, chosen by trial; reached by cases without a solution on a coarse grid
 COARSENING, COARSEST = 4, 64  # chosen by trial; the search starts on a grid of at most COARSENING * COARSEST nodes
 LANES = 64  # number of cases that are computed together, chosen by trial
 RESOLVED = 10  # chosen by trial; a grid is fine enough only if at least this number of cells is in contact
@@ -319,7 +319,7 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return the place where contact ends in a cell, w at this place, and the fraction of w left at the cell's end.
+    """Return where contact ends in a cell, w at this place, and the fraction of w that remains at the end of the cell.
 
     The Deborah number is `r`, and `inverse` is 1 / r. The force falls from `force` at the place `begins` to `force_end`
     at the end of the cell. One Newton step improves the place that is found by linear interpolation of the force.

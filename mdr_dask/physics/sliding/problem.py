@@ -26,9 +26,9 @@ from mdr_dask.physics.sliding.full_contact import steady_full_contact
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
-"""Floors of `Steady.columns`. If a result is below the floor, the relative error is the error divided by the floor.
+"""The relative error of a result is the error divided by the result, or by its floor if the result is smaller.
 
-The floor of the depth is the unit of height, which is the rms height.
+The four floors belong to `Steady.columns`. The floor of the depth is the unit of height, which is the rms height.
 """
 NODE_LEVELS = tuple(
     2**k for k in range(12)
@@ -67,7 +67,7 @@ class Request:
 
     @property
     def columns(self) -> int:
-        """Number of requested results: the first two of `Steady.columns` (drag and depth), or all four."""
+        """Number of requested results: all four of `Steady.columns`, or only the first two (drag and depth)."""
         return 4 if self.contact else 2
 
 
@@ -131,7 +131,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
     """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
-    # contact fraction and slope belong to a rounded depth; if two grids round alike, their difference hides this error
+    # contact fraction and slope are computed at a rounded depth; the rounding error may be equal on two grids
     unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:

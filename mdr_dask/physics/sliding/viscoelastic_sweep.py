@@ -134,12 +134,11 @@ def contact_point(low: float, high: float, start: float, slope: float, modes: Fl
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:
-    """Return the position where an element that is free from `place` on meets the line again, or -1 without contact.
+    """Return the position beyond `place` where a free element meets the line again, or -1 if contact does not begin.
 
     The search begins in the cell that ends at `node`. If contact ended inside a cell, the search must begin in the next
     cell, because the convex strain does not meet the same straight cell again. The logarithm of the strain is convex,
-    so that an exponential function that touches the strain is a lower bound of the strain. Nodes below this lower bound
-    are skipped.
+    so that a tangent exponential function is a lower bound of the strain. Nodes below this lower bound are skipped.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -304,7 +303,7 @@ def _stretch(
 def begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:
-    """Write the recovery modes of an element whose strain has suddenly decreased from `strain` by `excess`.
+    """Write the amplitudes of the recovery modes after the strain has suddenly decreased from `strain` by `excess`.
 
     The stretch of the fastest Prony term is adjusted so that the stress is exactly zero.
     """

@@ -60,7 +60,7 @@ from mdr_dask.physics.transients.patches import (
 
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
-VISITS = 6  # largest number of patches that end in a cell; the three sign changes of a cubic force allow fewer
+VISITS = 6  # limit for the patches that end in a cell; fewer can occur, because a cubic force has at most three zeros
 LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch extends beyond its run, or a work array is full
 
 # Entries of `Workspace.scan`, the state of the search

@@ -27,7 +27,7 @@ from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Pa
 
 STRIDE = 2.0  # longest step in the search for a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
-# There are WINDOWS windows of time. The line travels WINDOW cells in the first, and twice as far in each next one.
+# In the first of WINDOWS windows of time, the line travels WINDOW cells. Each further window is twice as long.
 WINDOW, WINDOWS = 8.0, 16
 
 
@@ -91,7 +91,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     if first.deborah > deborah:  # drift u (1 - D / D_1) of elements free since before the jump
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes this increase from the start of a window until half a window after the jump.
+    # passed earlier. `opened` includes this increase in the part of a window within half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k

@@ -17,7 +17,7 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 NEWTON_STEPS = 60  # largest number of steps of Newton's method; as many bisections would reach machine precision
-CLOSE = 1e-2  # in cells; the search for an edge of contact ends at a shorter step, with an error of about its cube
+CLOSE = 1e-2  # in cells; the search for an edge of contact ends after a shorter step s, with an error of about s^3
 # Entries of the sums over the patches; load and drag are divided by 4 G dx
 (
     LOAD,
