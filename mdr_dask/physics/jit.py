@@ -25,7 +25,7 @@ def jit(function: Kernel) -> Kernel:
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that must not create arrays. Arrays in named tuples are read several times faster."""
+    """Compile a function that must not create arrays. It reads arrays in named tuples several times faster."""
     return _cached(function, UNCOUNTED)
 
 

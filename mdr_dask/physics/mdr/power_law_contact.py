@@ -1,6 +1,6 @@
 """Closed forms for normal contacts of bodies with the profile f = A r^n and the effective modulus E_star.
 
-The factor kappa_n is `power_factor(n)`. The bodies are elastically similar, so that tangential forces have no effect.
+The factor kappa_n is `power_factor(n)`. Tangential forces have no effect, as the bodies are elastically similar.
 """
 
 from __future__ import annotations

@@ -243,7 +243,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
     """Write heights and slopes at the nodes of a finer grid in the given cells, and at one fine node on each side."""
     refinement = weights.shape[1]
     for step in range(refinement):
-        # the first fine node is in the cell before the given cells; the last two are in the cell after the given cells
+        # the first fine node is in the cell before the given cells, and the last two are in the cell after them
         for cell in range(-1 if step == refinement - 1 else 0, cells + 1 if step < 2 else cells):
             h, s = line.height[first + cell + 1 - WING :], line.slope[first + cell + 1 - WING :]
             value, rate = 0.0, 0.0
@@ -269,7 +269,7 @@ ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly 
 # CALM is 1 if the current block is entirely in contact or entirely free. SIZE is the size of the workspace.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM, SIZE = range(8 * LANES, 16 * LANES, LANES)
-# Indices of the results of a case that are extrapolated over the last step of the depth, and their number
+# Indices of the results that are extrapolated over the last step of the depth, and the number of these results
 DRAG, FRACTION, CONTACT_SLOPE, SECANTS = range(4)
 
 
@@ -342,7 +342,7 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
     """Return the place where a free element meets the line, and the fraction of u that remains at this place.
 
     At the start of the cell, the displacement of the element is u. `inverse` is 1 / De. At the place `last` the gap
-    between element and line is `gap_last` < 0. The first guess of the place is the zero of a parabola through the gaps
+    of a free element would be `gap_last` < 0. The first guess of the place is the zero of a parabola through the gaps
     at the start of the cell and at `last`. One Newton step improves this guess.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse

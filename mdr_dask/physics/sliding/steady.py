@@ -69,8 +69,8 @@ def _solve(
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
     The carried load is a convex, increasing function of the depth. Newton's method therefore approaches the depth from
-    above. The depth cannot exceed the depth in full contact. The result does not depend on the guess. `sums` receives
-    the sums at the returned depth.
+    above. The depth cannot exceed the depth in full contact at this load. The result does not depend on the guess.
+    `sums` receives the sums at the returned depth.
     """
     cells, blocks, barriers, mean = line
     most, high = load / (cells.mean.size - 1) - mean, np.inf

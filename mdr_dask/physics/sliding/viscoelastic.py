@@ -113,7 +113,7 @@ def travelling(solid: LinearSolid, cell: float) -> Travelling:
 def static_depth(profile: FloatArray, strain_area: float) -> float:
     """Return the depth at which the positive entries of depth + profile have the sum `strain_area`."""
     falling = np.sort(profile)[::-1]
-    depths = (strain_area - np.cumsum(falling)) / np.arange(1, profile.size + 1)  # if 1, 2, ... entries are positive
+    depths = (strain_area - np.cumsum(falling)) / np.arange(1, profile.size + 1)  # for 1, 2, ... positive entries
     return float(depths[np.flatnonzero(depths + falling > 0)[-1]])
 
 

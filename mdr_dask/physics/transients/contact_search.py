@@ -60,7 +60,7 @@ from mdr_dask.physics.transients.patches import (
 
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
-VISITS = 6  # limit for the patches that end in a cell; fewer can occur, because a cubic force has at most three zeros
+VISITS = 6  # more than the number of patches that can end in a cell (a cubic force has at most three zeros)
 LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch extends beyond its run, or a work array is full
 
 # Entries of `Workspace.scan`, the state of the search
@@ -278,7 +278,7 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 
     A cell is skipped if the gap between free elements and line is so wide that the line cannot have met these elements
     since they separated. The gap is computed from a lower bound of the displacement. This bound begins with the last
-    known displacement and approaches the least drift (a displacement, see `free_recovery`).
+    known displacement and approaches the least drift (D u' + u, see `free_recovery`).
     """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, lift = now.track, work.recovery.bounds, search.lift

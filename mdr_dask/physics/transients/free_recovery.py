@@ -91,7 +91,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     if first.deborah > deborah:  # drift u (1 - D / D_1) of elements free since before the jump
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes this increase in the part of a window within half a window after the jump.
+    # passed earlier. `opened` includes the increase within a window, but only until half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k

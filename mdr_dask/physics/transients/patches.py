@@ -173,8 +173,8 @@ def loading(line: Cubic, lift: float, deborah: float, y: float) -> float:
 def meeting(line: Cubic, depth: float, u: float, slope: float, x: float, y: float) -> float:
     """Return the first place from y to the end of a cell where the line rises above free elements, or `NONE`.
 
-    The free elements have the displacement u and the given slope at x. Along the line, the displacement decays
-    exponentially, which is expanded here to second order.
+    At x, the free elements have the displacement u, and the derivative of u along the line is `slope`. The exponential
+    decay of the displacement along the line is expanded to second order.
     """
     c0, c1, c2, c3 = line
     bend = slope * slope / u if u > 0 else 0.0

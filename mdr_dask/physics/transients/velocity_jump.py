@@ -19,7 +19,7 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-NEGLIGIBLE = 1e-5  # the change of the steady depth is taken as at least this fraction of the mean displacement
+NEGLIGIBLE = 1e-5  # smallest assumed change of the steady depth, as a fraction of the mean displacement
 MEMORY = 7.0  # relaxation times until a march ends; the displacements at the jump have then decayed to less than 0.1 %
 STEEPEST = 3.0  # a cubic does not overshoot if both end slopes are at most 3 times the secant (Fritsch and Carlson)
 

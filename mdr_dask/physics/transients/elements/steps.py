@@ -31,7 +31,7 @@ class Edges(NamedTuple):
     element.
 
     The element at one end of the cell is in contact. `place` is the distance between this element and the edge, in
-    cells, or -1 if there is no edge. `gap` is the gap at the other end at the instant at which the edge was found.
+    cells, or -1 if there is no edge. `gap` is the gap at the other end of the cell when the edge was found.
     """
 
     place: FloatArray
