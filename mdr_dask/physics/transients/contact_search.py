@@ -104,7 +104,7 @@ class Workspace(NamedTuple):
 def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> Workspace:
     """Return a workspace for 4 p + 4096 contact patches, where p is the number of `patches` before the jump."""
     start, end = np.empty((2, 4 * patches + 4096))
-    bounds = PathBounds(*np.empty((5, WINDOWS)))
+    bounds = PathBounds(*np.empty((4, WINDOWS)))
     earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
     recovery = FreeRecovery(earliest, place, farthest, barrier, np.zeros(1, np.int64), bounds)
     return Workspace(start, end, np.zeros(SUMS), np.empty(6), recovery, barriers, free_until)
@@ -242,12 +242,6 @@ def _search_period(search: Search, runs: IntArray) -> int:
 
 
 @jit_inline_uncounted
-def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first stored place of separation, or `otherwise` if no place is stored."""
-    return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
-
-
-@jit_inline_uncounted
 def _skip_pressed(search: Search, i: int, stop: int) -> int:
     """Return the first cell from i to `stop` in which contact may end or elements may have separated.
 
@@ -260,7 +254,7 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
     firm, until = scan[FIRM_LIFT], scan[FIRM_UNTIL]
     while i < stop:
         if i + 1 > until:
-            oldest = _oldest(work.recovery, begin)
+            oldest = work.recovery.earliest[0] if work.recovery.count[0] > 0 else begin
             k = window(2 * (i + 1 - oldest))
             firm, until = min(search.depth - bounds.most_drift[k], bounds.least_lift[k]), oldest + WINDOW * 2.0**k
         pressed = i < search.n and keeps_pressed(now.track, barriers, now.deborah, i, search.lift)
@@ -274,34 +268,19 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _skip_free(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from i to `stop` in which contact may begin.
-
-    A cell is skipped if the gap between free elements and line is so wide that the line cannot have met these elements
-    since they separated. The gap is computed from a lower bound of the displacement. This bound begins with the last
-    known displacement and approaches the least drift (D u' + u, see `free_recovery`).
-    """
-    now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
-    track, bounds, lift = now.track, work.recovery.bounds, search.lift
-    oldest = _oldest(work.recovery, scan[FREE_FROM])
-    drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
+    """Return the first cell from i to `stop` in which contact may begin."""
+    now, scan, barriers = search.now, search.work.scan, search.work.barriers
+    drift, fade = search.work.recovery.bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
     lowest = scan[LOWEST]
     while i < stop:
-        lowest = (lowest - drift) * fade + drift
-        may_begin = search.depth > work.free_until[np.uintp(i)]
-        if may_begin and not _stays_free(search, i, lowest - search.depth - track.peak[np.uintp(i)], oldest):
-            pressed = i >= search.n or keeps_pressed(track, barriers, now.deborah, i, lift)
-            if pressed or lift > barriers.idle[np.uintp(i)]:
+        lowest = (lowest - drift) * fade + drift  # this bound of the displacement approaches the least drift
+        if search.depth > search.work.free_until[np.uintp(i)]:
+            pressed = i >= search.n or keeps_pressed(now.track, barriers, now.deborah, i, search.lift)
+            if pressed or search.lift > barriers.idle[np.uintp(i)]:
                 break
         i += 1
     scan[LOWEST] = lowest
     return i
-
-
-@jit_inline_uncounted
-def _stays_free(search: Search, cell: int, gap: float, oldest: float) -> bool:
-    """Return whether elements that separated at or beyond `oldest` have certainly stayed free up to the given cell."""
-    opened = search.work.recovery.bounds.opened
-    return gap > 0 and gap > opened[window(2 * (cell + 1 - oldest))]
 
 
 @jit_inline_uncounted
@@ -438,8 +417,6 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
         return False, cell.stop
     u, u_slope, _ = displacement_at(now, recovery, probe)
     scan[LOWEST] = _lowest_beyond(search, u) if by_force else u
-    if _stays_free(search, i, scan[LOWEST] - peak, _oldest(recovery, scan[FREE_FROM])):
-        return False, cell.stop
     h, slope, _ = height_at(now.track, probe)
     gap, top = depth + h - u, probe
     if gap <= 0 and gap > (slope - u_slope) * (probe - i - low):

@@ -50,14 +50,12 @@ class PathBounds(NamedTuple):
     """Bounds over windows of time that end now, shape (WINDOWS,) each.
 
     During the shortest window the line travels `WINDOW` cells. Each further window is twice as long as the previous
-    window. `spread` is the range of the depth. `opened` is the largest increase of the gap between line and free
-    elements at one place. `least_lift` is the smallest lift (depth plus rate of the depth). `most_drift` (at least 0)
-    and `least_drift` (at most 0) are the extreme drifts of elements that separated within the window or have been free
-    since before the jump.
+    window. `spread` is the range of the depth. `least_lift` is the smallest lift (depth plus rate of the depth).
+    `most_drift` (at least 0) and `least_drift` (at most 0) are the extreme drifts of elements that separated within the
+    window or have been free since before the jump.
     """
 
     spread: FloatArray
-    opened: FloatArray
     least_lift: FloatArray
     most_drift: FloatArray
     least_drift: FloatArray
@@ -90,25 +88,18 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
     if first.deborah > deborah:  # drift u (1 - D / D_1) of elements free since before the jump
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
-    # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier. `opened` includes the increase within a window, but only until half a window after the jump.
-    rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
-        duration = WINDOW / deborah * 2.0**k
-        since = time - duration
+        since = time - WINDOW / deborah * 2.0**k
         while back > 0 and history.time[back] > since:
             back -= 1
             then, drift = history.depth[back], -history.rate[back]
             shallowest, deepest = min(shallowest, then), max(deepest, then)
-            least_lift, rise = min(least_lift, then - drift), max(rise, deepest - then)
+            least_lift = min(least_lift, then - drift)
             if drift > most or drift < least:
                 drift *= np.exp(history.time[back] - time)
                 most, least = max(most, drift), min(least, drift)
         bounds.spread[k], bounds.least_lift[k] = deepest - shallowest, least_lift
         bounds.most_drift[k], bounds.least_drift[k] = most, least
-        bounds.opened[k] = deepest - depth + rise
-        if gains > 0 and since < 0.5 * duration:
-            bounds.opened[k] += gains * (np.exp(-max(since, 0.0)) - np.exp(-min(time, 0.5 * duration)))
 
 
 @jit_inline_uncounted
