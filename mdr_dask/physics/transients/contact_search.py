@@ -21,7 +21,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
-from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
+from mdr_dask.physics.sliding.kelvin import Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_recovery import (
     ROUNDING,
@@ -68,10 +68,8 @@ LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch extends beyo
     BEGIN,  # place where the current patch begins
     FREE_FROM,  # place where contact last ended, or where the force last fell to zero
     HELD,  # place up to which the current patch is certainly in contact
-    FIRM_LIFT,  # a cell in contact can be skipped if the barrier of the cell is below this lift
-    FIRM_UNTIL,  # place up to which `FIRM_LIFT` is valid
     LOWEST,  # lower bound of the displacement of free elements at the end of the previous cell
-) = range(6)
+) = range(4)
 
 
 class Reachable(NamedTuple):
@@ -107,7 +105,7 @@ def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> W
     bounds = PathBounds(*np.empty((4, WINDOWS)))
     earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
     recovery = FreeRecovery(earliest, place, farthest, barrier, np.zeros(1, np.int64), bounds)
-    return Workspace(start, end, np.zeros(SUMS), np.empty(6), recovery, barriers, free_until)
+    return Workspace(start, end, np.zeros(SUMS), np.empty(4), recovery, barriers, free_until)
 
 
 class Motion(NamedTuple):
@@ -213,7 +211,7 @@ def _search_period(search: Search, runs: IntArray) -> int:
     track, origin, lift = now.track, now.track.origin, search.lift
     sums[:] = 0.0
     scan[BEGIN] = scan[FREE_FROM] = scan[HELD] = origin
-    scan[FIRM_UNTIL] = scan[LOWEST] = 0.0
+    scan[LOWEST] = 0.0
     # at the highest point, elements may have been free since the previous period, or since before the jump
     contact, found = search.depth >= displacement_at(now, work.recovery, origin)[0], 0
     if not contact:
@@ -249,20 +247,17 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
     = depth + h. Along the line u' = (drift - u) / D (see `free_recovery`). Therefore u stays below w wherever w + D h'
     exceeds the largest drift.
     """
-    now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
-    bounds, begin = work.recovery.bounds, scan[BEGIN]
-    firm, until = scan[FIRM_LIFT], scan[FIRM_UNTIL]
-    while i < stop:
+    now, recovery, barriers = search.now, search.work.recovery, search.work.barriers
+    begin, firm, until = search.work.scan[BEGIN], 0.0, 0.0
+    oldest = recovery.earliest[0] if recovery.count[0] > 0 else begin
+    while i < stop and begin <= i < search.n and keeps_pressed(now.track, barriers, now.deborah, i, search.lift):
         if i + 1 > until:
-            oldest = work.recovery.earliest[0] if work.recovery.count[0] > 0 else begin
             k = window(2 * (i + 1 - oldest))
-            firm, until = min(search.depth - bounds.most_drift[k], bounds.least_lift[k]), oldest + WINDOW * 2.0**k
-        pressed = i < search.n and keeps_pressed(now.track, barriers, now.deborah, i, search.lift)
-        if not (pressed and begin <= i and barriers.cell[np.uintp(i)] < firm):
+            firm = min(search.depth - recovery.bounds.most_drift[k], recovery.bounds.least_lift[k])
+            until = oldest + WINDOW * 2.0**k
+        if not barriers.cell[np.uintp(i)] < firm:
             break
-        whole = i % BLOCK == 0 and i + BLOCK < min(stop, until) and i + BLOCK <= search.n
-        i += BLOCK if whole and barriers.block[i // BLOCK] < firm else 1
-    scan[FIRM_LIFT], scan[FIRM_UNTIL] = firm, until
+        i += 1
     return i
 
 
@@ -317,7 +312,6 @@ def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, i
         contact, x = _contact_begin(search, cell, x, ended)
         if contact:
             scan[BEGIN] = scan[HELD] = x
-            scan[FIRM_UNTIL] = 0.0
         elif x >= stop:
             break
         else:  # from here on, the force on an element in contact would be negative
