@@ -58,7 +58,6 @@ from mdr_dask.physics.transients.patches import (
     unloading,
 )
 
-SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # more than the number of patches that can end in a cell (a cubic force has at most three zeros)
 LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch extends beyond its run, or a work array is full
@@ -99,11 +98,10 @@ class Workspace(NamedTuple):
     free_until: FloatArray
 
 
-def workspace_for(patches: int, barriers: Barriers, free_until: FloatArray) -> Workspace:
-    """Return a workspace for 4 p + 4096 contact patches, where p is the number of `patches` before the jump."""
-    start, end = np.empty((2, 4 * patches + 4096))
+def workspace_for(barriers: Barriers, free_until: FloatArray) -> Workspace:
+    """Return a workspace for as many contact patches as cells."""
+    start, end, earliest, place, farthest, barrier = np.empty((6, free_until.size + VISITS))
     bounds = PathBounds(*np.empty((4, WINDOWS)))
-    earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
     recovery = FreeRecovery(earliest, place, farthest, barrier, np.zeros(1, np.int64), bounds)
     return Workspace(start, end, np.zeros(SUMS), np.empty(4), recovery, barriers, free_until)
 
@@ -422,7 +420,6 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
         return True, begin
     if not by_force:
         return False, cell.stop
-    prune(now, recovery, probe, depth + h, search.motion.deepest)
     _add_separation(search, probe)
     return False, probe
 

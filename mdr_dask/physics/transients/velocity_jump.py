@@ -184,7 +184,7 @@ def _begun(
     # with this limit, the error of Newton's method is of fourth order in the time step
     close = change / request.per_decade**2
     marching = Marching(line.track, limits.first, reachable, deborah[1], load, low, high, onset, last / steps, close)
-    return marching, found, workspace_for(limits.first.start.size, line.barriers(deborah[1]), free_until)
+    return marching, found, workspace_for(line.barriers(deborah[1]), free_until)
 
 
 @jit
