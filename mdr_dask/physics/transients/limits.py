@@ -113,14 +113,16 @@ def steady_limits(
             continue
         before, after = (float(each) for each in deborah[k])
         first, drag = line.patches(float(depths[k, 0]), before)
-        slower, drag_after, is_full = first, float(drags[k, 1]), False
+        slower, is_full = first, False
         if after < before or first.start.size == 1:  # one patch: full contact (a period begins and ends in contact)
-            last, drag_after = line.patches(float(depths[k, 1]), after)
+            last, _ = line.patches(float(depths[k, 1]), after)
             slower, is_full = last if after < before else first, first.start.size == last.start.size == 1
         fast = after * n
         at, rate, tilt, end = _release(line.track, first, line.barriers(fast), fast, float(load * n))
         found.append(
-            SteadyLimits(drag, at, drag_after, rate, tilt, depths[k], first, slower, contacts[k], is_full, Outcome(end))
+            SteadyLimits(
+                drag, at, float(drags[k, 1]), rate, tilt, depths[k], first, slower, contacts[k], is_full, Outcome(end)
+            )
         )
     return found
 
