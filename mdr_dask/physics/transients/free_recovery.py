@@ -23,7 +23,8 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
-from mdr_dask.physics.transients.patches import CLOSE, NEWTON_STEPS, History, Patches, Track, height_at
+from mdr_dask.physics.refine import MOST_ITERATIONS
+from mdr_dask.physics.transients.patches import CLOSE, History, Patches, Track, height_at
 
 STRIDE = 2.0  # longest step in the search for a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
@@ -159,7 +160,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
     deborah = now.deborah
     first = x - deborah * now.time
     low, high, s = first, min(x, farthest), max(place, first)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MOST_ITERATIONS):
         if s > high:
             break
         since = (x - s) / deborah
@@ -273,7 +274,7 @@ def contact_begin(
     The gap is differentiated with respect to place, depth and time. The first guess x is between `low` and `high`.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MOST_ITERATIONS):
         if not low < x < high:
             x = 0.5 * (low + high)
         gap, slope, bend, by_depth, opening = gap_at(now, recovery, x)

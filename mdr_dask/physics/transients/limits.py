@@ -9,6 +9,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.sliding.kelvin import Barriers, Blocks, barriers_for, blocks_of, patches_at
@@ -18,7 +19,6 @@ from mdr_dask.physics.transients.patches import (
     DRAG,
     LENGTH,
     LOAD,
-    NEWTON_STEPS,
     SUMS,
     TILT,
     Patches,
@@ -27,8 +27,6 @@ from mdr_dask.physics.transients.patches import (
     released,
     track_of,
 )
-
-NEARLY = float(np.sqrt(np.finfo(float).eps))  # largest relative error of the load before the last Newton step
 
 
 class PreparedLine(NamedTuple):
@@ -142,13 +140,13 @@ def _release(
 ) -> tuple[float, float, float, int]:
     """Return `at`, `rate` and `tilt` of `SteadyLimits`, and the outcome."""
     rate, sums = 0.0, np.empty(SUMS)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MOST_ITERATIONS):
         released(track, first, barriers, deborah, rate, sums)
         if sums[LENGTH] <= 0:
             break
         miss = load - sums[LOAD]
         step = miss / sums[LENGTH]  # the length in contact is the derivative of the load with respect to the rate
         rate += step
-        if abs(miss) <= NEARLY * load:
+        if abs(miss) <= CLOSE * load:
             return sums[DRAG] + step * sums[TILT], rate, sums[TILT], Outcome.CONVERGED
     return sums[DRAG], rate, sums[TILT], Outcome.DEPTH_NOT_FOUND

@@ -9,6 +9,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit_uncounted
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import EPS, MOST_ITERATIONS
 from mdr_dask.physics.transients.contact_search import LEFT_LIMITS, Reachable, Workspace, find_contact
 from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.patches import (
@@ -18,7 +19,6 @@ from mdr_dask.physics.transients.patches import (
     GROWTH,
     LENGTH,
     LOAD,
-    NEWTON_STEPS,
     STIFFNESS,
     TILT,
     History,
@@ -89,7 +89,7 @@ def _balance(
         marching.track, marching.first, history, history.time[now], marching.deborah, np.exp(-history.time[now])
     )
     low, high = marching.low, marching.high
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MOST_ITERATIONS):
         history.depth[now], history.rate[now] = guess, a * guess + b
         if find_contact(instant, marching.reachable, work) < 0:
             return LEFT_LIMITS, 0.0, 0.0
@@ -104,7 +104,7 @@ def _balance(
             history.depth[now], history.rate[now] = guess, a * guess + b
             drag = sums[DRAG] + step * sums[DRAG_STIFFNESS]
             return Outcome.CONVERGED, drag, _drag_rate(sums, a, step)
-        if high - low <= 1e-13 * (abs(low) + abs(high)):
+        if high - low <= EPS * (abs(low) + abs(high)):
             # the load is discontinuous at this depth, because a single asperity comes into contact
             return Outcome.CONVERGED, sums[DRAG], _drag_rate(sums, a, 0.0)
         guess += step

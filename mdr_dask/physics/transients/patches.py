@@ -13,10 +13,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
+from mdr_dask.physics.refine import MOST_ITERATIONS
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
-NEWTON_STEPS = 60  # largest number of steps of Newton's method; as many bisections would reach machine precision
 CLOSE = 1e-2  # in cells; the search for an edge of contact ends after a shorter step s, with an error of about s^3
 # Entries of the sums over the patches; load and drag are divided by 4 G dx
 (
@@ -140,7 +140,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
         return float(contact_end(p, q, r, c, 0.0, y))
     # the Bernstein coefficients on [y, 1] decrease, and therefore the cubic decreases
     low, high, x = y, 1.0, y + width * begin / (begin - end)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MOST_ITERATIONS):
         value = p + x * (q + x * (r + x * c))
         if value > 0:
             low = x
