@@ -182,11 +182,11 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
 
 
 MOST_STEPS = 400_000  # largest number of time steps in one piece of a history
-# CELLS, PART and FIRST are divided by the number of steps per decade
+# CELLS and PART are divided by the number of steps per decade
 CELLS = 6.0  # largest number of cells that the line travels in a time step
-PART = 0.12  # largest time step, as a fraction of the duration of a ramp or of the period of an oscillation
-FIRST = 0.012  # first time step, as a fraction of the longest time step or of the unit of time, whichever is smaller
-NEARLY = 1e-2  # a time step is left out if its end differs from a requested time by less than this fraction of the step
+# largest time step, as a fraction of the duration of a ramp or of the period of an oscillation; the first time step is
+# the same fraction of the longest time step or of the unit of time, whichever is smaller
+PART = 0.12
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ class Piece:
         most = min(self.longest_step(nodes, per_decade), span)
         if span / most > MOST_STEPS:
             return None
-        first, ratio = FIRST / per_decade * min(most, 1.0), 10 ** (1 / per_decade)
+        first, ratio = PART / per_decade * min(most, 1.0), 10 ** (1 / per_decade)
         grown = first * ratio ** np.arange(int(np.ceil(np.log(most / (first * (ratio - 1)) + 1) / np.log(ratio))) + 1)
         grown = grown[(grown < span) & (np.diff(grown, append=np.inf) < most)]
         late = grown[-1] if grown.size else 0.0
@@ -353,11 +353,9 @@ def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
 
 
 def _with_times(instants: FloatArray, times: FloatArray) -> FloatArray:
-    """Return the times of the steps and the requested times, without steps that end very near to a requested time."""
+    """Return the times of the steps and the requested times. A requested time replaces the nearest time of a step."""
     inside = times[(times > instants[0]) & (times < instants[-1])]
-    around = np.concatenate([[-np.inf], inside, [np.inf]])
-    after = np.searchsorted(around, instants)
-    distance = np.minimum(around[after] - instants, instants - around[after - 1])
-    apart = distance > NEARLY * np.diff(instants, prepend=instants[0])
-    apart[[0, -1]] = True
-    return np.union1d(instants[apart], inside)
+    kept = np.ones(instants.size, np.bool_)
+    kept[np.searchsorted(0.5 * (instants[1:] + instants[:-1]), inside)] = False
+    kept[[0, -1]] = True
+    return np.union1d(instants[kept], inside)

@@ -12,6 +12,7 @@ import numpy as np
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
@@ -79,7 +80,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
     displacement of the element without contact. The mean displacement is a convex, increasing function of d.
     """
     n = under.size
-    for _ in range(200):
+    for _ in range(MOST_ITERATIONS):
         total, touching = 0.0, 0
         for j in range(n):
             w = depth + under[j]
@@ -92,13 +93,13 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
             nearest = np.inf
             for j in range(n):
                 nearest = min(nearest, free[j] - under[j])
-            if abs(total - mean * n) <= 1e-12 * abs(mean) * n:
+            if abs(total - mean * n) <= CLOSE * abs(mean) * n:
                 return nearest, True
             depth = nearest + (mean * n - total)
             continue
         step = (mean * n - total) / touching
         depth += step
-        if abs(step) <= 1e-12 * (abs(depth) + abs(mean)):
+        if abs(step) <= CLOSE * (abs(depth) + abs(mean)):
             return depth, True
     return depth, False
 
@@ -201,12 +202,12 @@ def _carrying_rate(
     """
     force, power, slope, pulls = workspace.force, workspace.power, workspace.slope, workspace.pulls
     drag, length = 0.0, 0.0
-    for iteration in range(60):
+    for _ in range(MOST_ITERATIONS):
         for j in range(force.size):
             force[j] = pulls[j] + weight * (rate + drive.deborah * slope[j])
             power[j] = force[j] * slope[j]
         carried, drag, length = _forces(state, workspace, drive.first, False)
-        if abs(carried - drive.load) <= 1e-11 * drive.load or iteration == 59:
+        if abs(carried - drive.load) <= CLOSE * drive.load:
             break
         if length > 0:
             rate += (drive.load - carried) / (length * weight)
@@ -217,7 +218,6 @@ def _carrying_rate(
 
 
 DRAG, DEPTH, CONTACT = range(3)
-CORRECTIONS = 2  # number of corrections of the times of separation and of the depth in a time step
 
 
 class State(NamedTuple):
@@ -408,10 +408,9 @@ def _step(
             workspace.after_terms[j, m] = state.terms[j, m]
         workspace.after[j] = recover(solid, state.displacement[j], workspace.after_terms, j, lapse.decay, lapse.modes)
     depth, good = depth_for(workspace.under, workspace.after, mean, guess)
-    for _ in range(CORRECTIONS):
-        if good:
-            _separate(solid, state, workspace, lapse, old_depth, depth, deborah)
-            depth, good = depth_for(workspace.under, workspace.after, mean, depth)
+    if good:  # correct the times of separation and the depth once
+        _separate(solid, state, workspace, lapse, old_depth, depth, deborah)
+        depth, good = depth_for(workspace.under, workspace.after, mean, depth)
     if good:
         _move(solid, state, workspace, lapse, old_depth, depth)
     return depth, good
