@@ -88,7 +88,7 @@ def difference(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def logarithms(stack: FloatArray) -> FloatArray:
-    """Return the logarithms of a stack of positive numbers; the smallest positive float replaces 0 and less."""
+    """Return the logarithms of a stack; numbers of 0 or less are replaced by the smallest positive float."""
     logs: FloatArray = np.log(np.maximum(stack, np.finfo(float).tiny))
     return logs
 

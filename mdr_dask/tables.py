@@ -92,7 +92,7 @@ class Sheet:
 
 
 class Read(dict[str, FloatArray]):
-    """The columns that were read from a table, by `Column.name`, in SI.
+    """The columns that were read from a table, in SI, indexed by `Column.name`.
 
     `headings` contains the name of each column as written in the table. `remark` names the columns and lines of the
     table that were not used. `unused` maps the name of each unused column to its unit and its numbers.
@@ -160,7 +160,7 @@ def _workbook(content: bytes, source: str) -> str:
 
 
 def decimal_marks(texts: Sequence[str]) -> str:
-    """Return the decimal marks with which all texts are numbers: ``,`` for ``30,0``, and both for ``3,158``."""
+    """Return which of ``.`` and ``,`` can be the decimal mark of all texts: ``,`` for ``30,0``, both for ``3,158``."""
     return "".join(mark for mark, form in _DECIMALS.items() if all(map(re.compile(form).fullmatch, texts)))
 
 
@@ -603,7 +603,7 @@ def _misspelt(sheet: Sheet, meanings: Sequence[Meaning], absent: Sequence[Column
 
 
 def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -> tuple[Read, list[str]]:
-    """Return the values, in SI, of the columns that have a `Column`, and the problems of these columns."""
+    """Return the values, in SI, of the columns of the sheet that mean a `Column`, and messages about their problems."""
     read, problems, taken = Read(), [], {}
     for place, (column, written, is_logarithm) in enumerate(meanings):
         if column is None:
@@ -710,7 +710,7 @@ def numbers(sheet: Sheet) -> FloatArray:
 
 
 def read_head(text: str) -> Sheet:
-    """Return the first rows of a table, with the names and units of its columns. Raise DataError without rows."""
+    """Return the first rows of a table, with the names and units of its columns. Raise DataError if it has no rows."""
     return read_sheet("\n".join(text.splitlines()[:HEAD_LINES]), "")
 
 

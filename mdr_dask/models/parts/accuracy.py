@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 
-ACCURACY = 0.01  # relative accuracy of friction if the campaign does not give one: below the scatter between surfaces
+# Relative accuracy of friction if the campaign does not give one. Friction scatters more between surfaces.
+ACCURACY = 0.01
 
 
 def missed_accuracy(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
-MOST_COLUMNS = 6  # a text with more columns is a map, with fewer columns a table; chosen by trial
+MOST_COLUMNS = 6  # largest number of columns of a table; a text with more columns is a map; chosen by trial
 #: File name extensions of text tables and of workbooks.
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 
@@ -397,7 +397,7 @@ COORDINATES = (
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
     """Return an index and a unit for each of the columns x, y and z. Return () if one of these columns is missing.
 
-    If the columns have no names, x, y and z are the only three columns that do not hold row numbers.
+    If the columns have no names, there must be exactly three columns apart from row numbers: x, y and z, in this order.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)

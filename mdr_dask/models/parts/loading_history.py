@@ -42,7 +42,7 @@ class Steps(_History):
 
     shape: Literal["steps"]
     times: Numbers = quantity(
-        "s", "increasing times at which velocity and normal force change; none is negative", usual="1 ms", min_length=1
+        "s", "times, increasing and not negative, at which velocity and force change", usual="1 ms", min_length=1
     )
     velocities: Numbers = quantity("m/s", "velocity after each of the times", usual="100 mm/s", min_length=1)
     forces: Numbers | None = quantity(

@@ -25,7 +25,7 @@ _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|te
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
 #: Pairs of columns. Each pair determines storage and loss modulus.
 WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
-SAME_TEMPERATURE = 1.0  # K; the temperature of one curve varies by less, those of two curves differ by more
+SAME_TEMPERATURE = 1.0  # K; rows of a table whose temperatures differ by at most this belong to one curve
 
 
 class ModulusTable(NamedByFile):
@@ -49,8 +49,8 @@ class ModulusTable(NamedByFile):
     reference: float | None = quantity(
         "K",
         "reference temperature; the curves of all other temperatures are shifted along the frequency until they "
-        "overlap. If neither reference nor table_temperature is given, wlf, arrhenius or shift_factors shifts the "
-        "curves",
+        "overlap. If neither reference nor table_temperature is given, the curves are shifted by wlf, arrhenius or "
+        "shift_factors",
         usual="20 degC",
         default=None,
         gt=0,
@@ -137,7 +137,7 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
         reference = chosen.reference
         across, along, text = _superposed(chosen)
         shift, rise = 10**across, 10**along
-        text = f"both moduli, {_vertical(chosen)}{text}{_compared(levels, across, law, reference)}"
+        text = f"the overlap of both moduli, {_vertical(chosen)}{text}{_compared(levels, across, law, reference)}"
     elif law is not None:
         reference, text = law.reference, f"the given shift factors, moduli {_vertical(chosen)}"
         shift, rise = law.factor(levels), vertical_factor(chosen, levels, reference)
@@ -174,7 +174,7 @@ def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: fl
 
 
 def _vertical(chosen: ModulusTable) -> str:
-    """Return a text that says whether moduli are multiplied by b_T, and the thermal expansion that determines b_T."""
+    """Return a text on whether moduli are multiplied by b_T and, if they are, on the thermal expansion in b_T."""
     from mdr_dask.physics.superposition.master_curve import EXPANSION
 
     if chosen.vertical == "none":
@@ -218,10 +218,10 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
     try:
         apart = np.abs(decades - np.log10(law.factor(levels) / law.factor(reference)))
     except ValueError as error:
-        return f", whose shift factors cannot be compared with the given ones ({error})"
+        return f"; these shift factors cannot be compared with the given ones ({error})"
     worst = int(apart.argmax())
     return (
-        f", whose shift factors differ from the given ones by up to {apart[worst]:.2g} decades (at "
+        f"; these shift factors differ from the given ones by up to {apart[worst]:.2g} decades (at "
         f"{shown(levels[worst], 'K')})"
     )
 

@@ -11,8 +11,8 @@ from mdr_dask.physics.refine import SAFETY
 from mdr_dask.tables import AGREE
 from mdr_dask.units import shown
 
-OUTER = 2  # a table may have a row of positions and a row of row numbers on each side, and such columns
-FEW_LEVELS = 10  # at most this number of distinct heights: a designed surface such as a grating, chosen by trial
+OUTER = 2  # largest number of rows or columns with positions or row numbers on one side of a table
+FEW_LEVELS = 10  # largest number of distinct heights of a designed surface such as a grating, chosen by trial
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:

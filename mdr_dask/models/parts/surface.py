@@ -113,9 +113,9 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the parameters in `value`.
+    """Return the parameters `value` of a campaign. Add ``hurst: None`` if they contain a surface named `surface`.
 
-    If `value` contains a measured surface but no Hurst exponent, add ``hurst: None``.
+    The default of `hurst` is for generated roughness only. If `value` contains `hurst`, this number is kept.
     """
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value

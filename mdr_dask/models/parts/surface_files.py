@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-POINT_ERROR = 0.1  # assumed relative error of each value of a spectrum without errors, chosen by trial
+POINT_ERROR = 0.1  # assumed relative error of each value of a spectrum whose errors are unknown, chosen by trial
 # A surface counts as isotropic if its anisotropy does not exceed this value. The slopes along x and y then differ by at
 # most about a quarter.
 MOST_ANISOTROPY = 0.25
@@ -174,7 +174,7 @@ def scan_of(options: Any, file: DataFile) -> Scan:
 
 @lru_cache(maxsize=64)
 def line_of_scan(options: Any, file: DataFile, *taper_and_band: float) -> MeasuredLine:
-    """Return a scan without its trend. `options` has the attributes of `scan_of` and `detrend`."""
+    """Return a scan without its trend. `options` has the attribute `detrend` and those that `scan_of` needs."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
     scan = scan_of(options, file)
@@ -191,7 +191,7 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if the levelled heights, mostly a parabola, may contain the form of the part.
+    """Return a warning if a parabola, perhaps the form of the measured part, explains most of the levelled heights.
 
     `level` are the heights minus a fitted plane or line. `curved` are the heights minus a fitted parabola.
     """

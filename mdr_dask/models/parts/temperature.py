@@ -23,7 +23,9 @@ class Wlf(Parameters):
     """The law of Williams, Landel and Ferry."""
 
     c1: float = quantity("1", "constant c1 of log10 a_T = -c1 (T - reference)/(c2 + T - reference)", usual="17.4", gt=0)
-    c2: float = quantity("K", "constant c2 in the formula of c1", usual="51.6 K", gt=0)
+    c2: float = quantity(
+        "K", "constant c2 in the formula log10 a_T = -c1 (T - reference)/(c2 + T - reference)", usual="51.6 K", gt=0
+    )
     reference: float = quantity("K", "reference temperature for c1 and c2, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
