@@ -84,7 +84,7 @@ def worst_moment(marched: tuple, moments: int, generator: np.random.Generator) -
     line, worst = sampled(marching), np.nan
     for now in generator.permutation(np.arange(1, found.time.size))[:moments]:
         travel, patches = marching.deborah * found.time[now], searched_afresh(marching, found, now, work)
-        if patches < 0 or travel > 1.2 * marching.track.cells:
+        if patches == 0 or travel > 1.2 * marching.track.cells:
             continue
         whole = slice(1, patches - 1)  # the first and the last are one
         if np.min(work.end[whole] - work.start[whole], initial=travel) < SHORT / SAMPLES:

@@ -60,7 +60,6 @@ from mdr_dask.physics.transients.patches import (
 
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # more than the number of patches that can end in a cell (a cubic force has at most three zeros)
-LEFT_LIMITS = -1  # outcome if the depth leaves its limits, a patch extends beyond its run, or a work array is full
 
 # Entries of `Workspace.scan`, the state of the search
 (
@@ -152,9 +151,10 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at the last instant of the history. Return the number of patches, or `LEFT_LIMITS`.
+    """Find the contact patches at the last instant of the history. Return the number of patches.
 
-    The patches and the sums over the patches are written to the workspace.
+    The number is 0 if a patch extends beyond its run, or if a work array is full. The patches and the sums over the
+    patches are written to the workspace.
     """
     last, recovery = now.history.count - 1, work.recovery
     motion = _motion_until(now, reachable.second)
@@ -204,7 +204,7 @@ def _motion_until(now: Instant, second: float) -> Motion:
 
 @jit_uncounted
 def _search_period(search: Search, runs: IntArray) -> int:
-    """Find the patches in one period of the line. Return the number of patches, or `LEFT_LIMITS`."""
+    """Find the patches in one period of the line. Return the number of patches (see `find_contact`)."""
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
     sums[:] = 0.0
@@ -222,12 +222,12 @@ def _search_period(search: Search, runs: IntArray) -> int:
             i = _skip_pressed(search, i, stop) if contact else _skip_free(search, i, stop)
             if i >= stop:
                 break
+            if max(found, work.recovery.count[0]) + VISITS > work.start.size:
+                return 0
             contact, found = _examine(search, i, contact, found)
-            if found < 0:
-                return LEFT_LIMITS
             i += 1
         if contact and run + 1 < runs.shape[0]:
-            return LEFT_LIMITS
+            return 0
     finish = track.cells + origin
     begin = scan[BEGIN] if contact else finish
     add_patch(track, begin, finish, lift, now.deborah, sums)
@@ -280,13 +280,10 @@ def _skip_free(search: Search, i: int, stop: int) -> int:
 def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, int]:
     """Find where contact begins and ends in cell i.
 
-    Return whether there is contact at the end of the cell, and the number of patches found so far. If the work arrays
-    are full, `LEFT_LIMITS` replaces this number.
+    Return whether there is contact at the end of the cell, and the number of patches found so far.
     """
     now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
     track, barriers = now.track, work.barriers
-    if recovery.count[0] + VISITS > recovery.place.size or found + VISITS > work.start.size:
-        return contact, LEFT_LIMITS
     pressed = i < search.n and keeps_pressed(track, barriers, now.deborah, i, search.lift)
     barrier = barriers.cell[np.uintp(i)] if i < search.n else search.lift
     weak = (contact or pressed) and barrier >= recovery.bounds.least_lift[WINDOWS - 1]

@@ -10,7 +10,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit_uncounted
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import EPS, MOST_ITERATIONS
-from mdr_dask.physics.transients.contact_search import LEFT_LIMITS, Reachable, Workspace, find_contact
+from mdr_dask.physics.transients.contact_search import Reachable, Workspace, find_contact
 from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -81,7 +81,7 @@ def _balance(
 ) -> tuple[int, float, float]:
     """Find, by Newton's method, the depth that carries the load at the last instant of the history.
 
-    Return the outcome (or `LEFT_LIMITS`), the drag, and the derivative of the drag with respect to t / tau.
+    Return the outcome, the drag, and the derivative of the drag with respect to t / tau.
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
@@ -91,8 +91,8 @@ def _balance(
     low, high = marching.low, marching.high
     for _ in range(MOST_ITERATIONS):
         history.depth[now], history.rate[now] = guess, a * guess + b
-        if find_contact(instant, marching.reachable, work) < 0:
-            return LEFT_LIMITS, 0.0, 0.0
+        if find_contact(instant, marching.reachable, work) == 0:
+            break
         off = sums[LOAD] - load
         step = -off / sums[STIFFNESS] if sums[STIFFNESS] > 0 else 0.5 * (low + high) - guess
         if off < 0:
@@ -109,7 +109,7 @@ def _balance(
             return Outcome.CONVERGED, sums[DRAG], _drag_rate(sums, a, 0.0)
         guess += step
         if not marching.low <= guess <= marching.high:
-            return LEFT_LIMITS, 0.0, 0.0
+            break
         if not low < guess < high:
             guess = 0.5 * (low + high)
     return Outcome.DEPTH_NOT_FOUND, 0.0, 0.0
@@ -146,7 +146,7 @@ def march_depth(marching: Marching, found: Trajectory, work: Workspace) -> int:
     """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
     `found` contains all times. The other quantities in `found` are given at the first instant, and are written for all
-    later instants. Return an `Outcome` or `LEFT_LIMITS`.
+    later instants. Return an `Outcome`.
     """
     time, depth, rate, drag, drag_rate = found
     for now in range(1, time.size):

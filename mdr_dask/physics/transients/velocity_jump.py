@@ -14,7 +14,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit, last_until
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.contact_search import LEFT_LIMITS, Reachable, Workspace, workspace_for
+from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits
 from mdr_dask.physics.transients.march import Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
@@ -142,10 +142,10 @@ def march(
     change = max(abs(float(np.diff(limits.depth)[0])), NEGLIGIBLE * load / cells)
     for widening in (1, 4, 16):
         marching, found, work = _begun(line, load, deborah, limits, request, change, widening * change)
-        outcome = march_depth(marching, found, work)
-        if outcome != LEFT_LIMITS:
-            return marching, found, work, Outcome(outcome)
-    return marching, found, work, Outcome.DEPTH_NOT_FOUND
+        outcome = Outcome(march_depth(marching, found, work))
+        if outcome == Outcome.CONVERGED:
+            break
+    return marching, found, work, outcome
 
 
 def _begun(
