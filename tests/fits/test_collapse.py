@@ -37,7 +37,7 @@ def step(temperature):
 @pytest.mark.parametrize(
     ("case", "verdicts"),
     [
-        ({}, ("approximately: ", "the curves collapse: yes", "wlf: approximately: departs by 5 % rms")),
+        ({}, ("approximately: ", "the curves collapse: yes", "wlf: approximately: departs by")),
         ({"shift": step}, ("no: ", "the curves collapse: yes", "wlf: no", "arrhenius: no")),
         ({"tilt": 0.3}, ("not tested: ", "the curves collapse: not tested: shift factors are not determined")),
     ],

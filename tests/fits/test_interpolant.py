@@ -84,7 +84,7 @@ def test_the_command(toy, tmp_path, monkeypatch, capsys):
     assert main(["run", "a.yaml", "--quiet"]) == 0
     assert main(["law", "results/a.zarr", "height", "-o", "height.nc"]) == 0
     printed = capsys.readouterr().out
-    assert "position: 0.001 m to 1 m" in printed
+    assert "position: 1 mm to 1 m" in printed
     with xr.open_dataset("height.nc") as opened:
         found = opened.interp(slope=1.25, position=0.1).load()
     mean = xr.open_zarr("results/a.zarr").height.mean("realisation")

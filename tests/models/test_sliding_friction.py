@@ -112,18 +112,6 @@ def test_finer_accuracy_takes_finer_grids_and_is_met():
     assert np.max(errors[1]) < np.max(errors[0])
 
 
-def test_friction_below_zero_lies_within_an_error_that_is_not():
-    """With two nodes per wave, friction may be negative, but its error must not be."""
-    wanted = ("friction_coefficient", "friction_coefficient_error")
-    case = {"points": 50, "hurst": 0.0, "normal_force": 0.01, "velocity": 1.0}
-    found = [
-        MODEL.compute(Block(BASE.model_copy(update=case | {"oversampling": grid}), {}, 1, (366,), 0, wanted, None))
-        for grid in (1, 64)
-    ]
-    (coarse, error), (fine, _) = ([one.values[name].item() for name in wanted] for one in found)
-    assert coarse < 0 < fine < coarse + error
-
-
 SOLID = {"static_modulus": 1e7, "glass_modulus": 5e7, "relaxation_time": 1e-3}
 
 

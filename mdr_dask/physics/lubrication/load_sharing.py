@@ -31,7 +31,7 @@ def distance_of_means(gap: float) -> float:
     # `mean_overlap(-d)` is the mean gap. It is at least d, and at most exp(-d^2 / 2) / sqrt(2 pi) if d is negative.
     # The logarithm of the mean gap varies slowly with d.
     least = -sqrt(max(-2 * log(gap * sqrt(2 * pi)), 0.0)) - gap
-    return float(brentq(lambda d: log(max(mean_overlap(-d), float_info.min) / gap), least, gap + 1))
+    return float(brentq(lambda d: log(max(mean_overlap(-d), float_info.min)) - log(gap), least, gap + 1))
 
 
 def asperity_pressure(film: float, rms: float, wavelength: float, E_star: float) -> float:
