@@ -98,8 +98,9 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(barriers: Barriers, free_until: FloatArray) -> Workspace:
-    """Return a workspace for as many contact patches as cells."""
-    start, end, earliest, place, farthest, barrier = np.empty((6, free_until.size + VISITS))
+    """Return a workspace for as many contact patches as cells, and as many separations in each period."""
+    start, end = np.empty((2, free_until.size + VISITS))
+    earliest, place, farthest, barrier = np.empty((4, (PERIODS + 1) * free_until.size + VISITS))
     bounds = PathBounds(*np.empty((4, WINDOWS)))
     recovery = FreeRecovery(earliest, place, farthest, barrier, np.zeros(1, np.int64), bounds)
     return Workspace(start, end, np.zeros(SUMS), np.empty(4), recovery, barriers, free_until)
@@ -171,7 +172,7 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 recovery.place[k] -= now.track.cells
                 recovery.farthest[k] -= now.track.cells
             prune(now, recovery, now.track.origin, depth, motion.deepest)
-            if recovery.count[0] == 0:
+            if recovery.count[0] == 0 or found == 0:
                 break
             found = _search_period(search, reachable.runs)
     return found
@@ -222,7 +223,7 @@ def _search_period(search: Search, runs: IntArray) -> int:
             i = _skip_pressed(search, i, stop) if contact else _skip_free(search, i, stop)
             if i >= stop:
                 break
-            if max(found, work.recovery.count[0]) + VISITS > work.start.size:
+            if found + VISITS > work.start.size or work.recovery.count[0] + VISITS > work.recovery.place.size:
                 return 0
             contact, found = _examine(search, i, contact, found)
             i += 1
