@@ -165,7 +165,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block of the lengths `chunks` for estimates, at a `position` from 0 (start of group) to 1 (end)."""
+        """Return a block with the lengths `chunks`: at the start of the study for `position` 0, at the end for 1."""
         starts = self._starts(chunks, position)
         return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
 
@@ -330,7 +330,8 @@ def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts if a dimension is cut into nearly equal parts of at most `most` values.
 
-    If later rounds may follow, the length along ``realisation`` divides the number of realisations in the first round.
+    If later rounds may follow, the number of realisations in the first round is a multiple of the length along
+    ``realisation``.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication

@@ -134,7 +134,7 @@ def plot(
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return each warning of the finished results once for each store, with the number of cases."""
+    """Return the different warnings of each store, with the number of cases that have them."""
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 

@@ -167,8 +167,8 @@ def columns_to_use(
         known = {column_of(frame, name) for name in names}
         hints = (each if each in known else each + nearest(each, names) for each in got)
         raise DataError(
-            "expected columns with friction coefficient, force, and velocity or temperature, or with modulus, frequency"
-            f" or time, and temperature, got {', '.join(hints)}: name columns by --over, --of and --by"
+            "expected three columns, such as friction coefficient, velocity and force, or modulus, frequency and "
+            f"temperature, got {', '.join(hints)}: name columns by --over, --of and --by"
         )
     over, by, *ordinates = varied[0]
     return over, tuple(ordinates), by

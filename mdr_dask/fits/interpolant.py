@@ -89,7 +89,7 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    # undo the factor LEFT: here, the gap at a missing value is as wide as the gaps that `left_out_error` tests
+    # without the factor LEFT, because values are really missing here
     left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])

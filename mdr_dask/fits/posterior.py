@@ -169,7 +169,8 @@ def at_ends(found: Posterior) -> FloatArray:
 def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
     """Return the indices of the unknowns with an open end, and of the unknowns that depend on these.
 
-    An unknown depends on them if its spread would decrease by more than the fraction `APPROXIMATE` if they were known.
+    An unknown depends on the open ones if knowledge of the open ones would reduce its spread by more than the fraction
+    `APPROXIMATE`.
     """
     free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:

@@ -248,7 +248,9 @@ def _collapse(data: xr.Dataset) -> Variables:
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))
     loads = np.array([load for load in np.unique(force) if np.count_nonzero(known & (force == load)) >= 3])
     if loads.size < 2:
-        raise FitError(f"expected two loads with three velocities or more up to the largest friction, got {loads.size}")
+        raise FitError(
+            f"expected at least two loads, each with three velocities below the maximum of friction, got {loads.size}"
+        )
     used = np.flatnonzero(known & np.isin(force, loads))
     x, curve, count = np.log(velocity[used]), np.searchsorted(loads, force[used]), table.count(used)
     stack, reference = table.logarithms(used), loads.size // 2

@@ -93,8 +93,8 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
 
     `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as
     ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. Further values after
-    commas, as in ``"2 GPa, 200 HV"``, show other common units of the quantity. If one of these units brings a number
-    without a unit nearer to the first usual value, ``check`` asks the user about this number. The other arguments,
+    commas, as in ``"2 GPa, 200 HV"``, show other common units of the quantity. ``check`` asks the user about a
+    number without a unit that would be closer to the first usual value in one of these units. The other arguments,
     such as ``default``, ``gt`` and ``le``, are passed to :func:`pydantic.Field`.
     """
 
@@ -139,8 +139,8 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
     return notes
 
 
-#: Number of bits to which dimensionless numbers are rounded, of 53. Numbers that differ by less than about 250 rounding
-#: errors (6e-14) become equal in most cases and then share one solution.
+#: Number of bits of rounded dimensionless numbers; a double has 53. Numbers with a relative difference of less than
+#: about 6e-14 become equal in most cases and then share one solution.
 CANONICAL_BITS = 44
 
 

@@ -329,7 +329,7 @@ def group_name(series: str, member: str = "") -> str:
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block. The array has `further` more dimensions than the ledger."""
+    """Return the name of the chunk of a block in an array that has `further` dimensions in addition to the ledger's."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 

@@ -33,7 +33,7 @@ def verify_packed(path: Path) -> Inspection:
             needed, free = sum(entry.file_size for entry in packed.infolist()), shutil.disk_usage(folder).free
             if needed > free:
                 raise StoreError(
-                    f"{path}: needs {needed} bytes to unpack, expected at most the {free} bytes of {folder}"
+                    f"{path}: expected enough disk space to unpack {needed} bytes, got {free} free bytes in {folder}"
                 )
             expected = _checksums(path, packed)
             packed.extractall(folder)  # `extractall` never writes outside the folder

@@ -68,7 +68,7 @@ def test_table_needs_a_temperature_or_a_reference():
 
 
 def test_a_reference_needs_temperatures_that_enclose_it(tmp_path):
-    with pytest.raises(DataError, match="expected a column temperature, because reference is given"):
+    with pytest.raises(DataError, match="expected a column 'temperature', because `reference` is given"):
         moduli(tmp_path, "f [Hz],G' [MPa],G'' [MPa]\n1,2,1\n10,3,2\n", reference=300.0)
     with pytest.raises(DataError, match=r"expected a reference between 16\.85 degC and 26\.85 degC, got -253\.1 degC"):
         solid_of(material(dma_table={"file": shifted_table(tmp_path / "x.csv", (290.0, 300.0)), "reference": 20.0}))

@@ -27,7 +27,7 @@ def points_for(modes: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Generated:
-    """Two lines with random phases: self-affine with unit rms height, or with the spectra of measured surfaces, in m.
+    """Two lines with random phases: self-affine with unit rms height, or in m with the spectra of measured surfaces.
 
     `points` is the number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
     `length` is the circumference of a roller in m. `longest` is this length divided by the longest wavelength, and

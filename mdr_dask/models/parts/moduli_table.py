@@ -121,8 +121,8 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
     if temperature is None:
         if chosen.reference is not None:
             raise DataError(
-                f"{chosen.file.name}: expected a column temperature, because reference is given: add the column, or "
-                "give table_temperature instead if all rows were measured at one temperature"
+                f"{chosen.file.name}: expected a column 'temperature', because `reference` is given: add it, or "
+                "give `table_temperature` instead if all rows were measured at one temperature"
             )
         only = chosen.table_temperature
         return Moduli(omega, storage, loss, only, None if only is None else (only, only))

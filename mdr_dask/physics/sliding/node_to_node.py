@@ -254,7 +254,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
             height[place], slope[place] = value, rate / refinement
 
 
-ITERATIONS = 25  # largest number of sweeps, chosen by trial; reached by cases without a solution on a coarse grid
+ITERATIONS = 25  # largest number of sweeps, chosen by trial; a case that has no solution on a grid needs all of them
 COARSENING, COARSEST = 4, 64  # chosen by trial; the search starts on a grid of at most COARSENING * COARSEST nodes
 LANES = 64  # number of cases that are computed together, chosen by trial
 RESOLVED = 10  # chosen by trial; a grid is fine enough only if at least this number of cells is in contact

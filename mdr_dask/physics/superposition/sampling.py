@@ -59,7 +59,7 @@ def first_guess(curves: Curves) -> FloatArray:
 def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
     """Return the curves with as many spline coefficients as the shifted curves need.
 
-    On both sides the spline is longer than the shifted curves by the prior scatter of a step.
+    The spline extends beyond the shifted curves on both sides by `STEP_SCATTER`.
     """
     moved = curves.x + np.append(0.0, shifts)[curves.member]
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * STEP_SCATTER) * CELLS)) + 3)
