@@ -24,7 +24,7 @@ PARTS = 2**32
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
-    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m. A parabolic asperity breaks the layer if its curvature is above ``12 s``.
+    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m. A parabolic asperity with a curvature above ``12 s`` breaks the layer.
 
     tau0 is the limiting shear stress of the layer in Pa, and h_c is the critical thickness of the layer in m.
     """
