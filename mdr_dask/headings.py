@@ -118,7 +118,7 @@ def is_called(heading: str, name: str, *others: str) -> bool:
 
 
 def nearest(heading: str, names: Sequence[str]) -> str:
-    """Return a hint with a name that is similar to a heading, or else with a name that shares a word with it.
+    """Return a hint with a name that is similar to a heading, or else with a name that shares a word with the heading.
 
     The word may also be in a synonym of the name. The hint is empty if there is no such name.
     """

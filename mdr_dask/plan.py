@@ -28,8 +28,8 @@ OPERATIONS = 1e9
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share a part of the computation are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
-#: Blocks whose cases share work and that have fewer operations than `MOST_SHARED` are halved only if this multiplies
-#: the total number of operations by less than this factor.
+#: If cases share work, blocks of at most `MOST_SHARED` operations are halved only if the operations of all blocks
+#: together increase by less than this factor.
 REPEATED_WORK = 1.15
 #: The operations of at most this number of blocks of a series are counted, so that `check` is fast. Chosen by trial.
 SAMPLED = 1000
@@ -129,7 +129,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the operations of a block; if the model cannot count them, assume sqrt(N) blocks for N results."""
+        """Return the operations of a block, estimated from numbers of results if the model cannot count operations."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)
@@ -235,7 +235,7 @@ def templates(
     problems = []
     for series in campaign.series:
         sizes = {**series.sizes, "realisation": realisations}
-        needed, limit = 6.0 * math.prod(sizes.values()), available_memory()  # the ledger, and five masks of a round
+        needed, limit = 6.0 * math.prod(sizes.values()), available_memory()  # in bytes, for the ledger and five masks
         if needed > limit:
             counts = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
             where = f"series.{series.name}" if series.name else "parameters"

@@ -75,7 +75,7 @@ class Mesh:
     # For each adaptive axis (key: its index in the series), the positions of its values, from 0 to 1.
     shares: Mapping[int, FloatArray]
     # Mask of the needed cases. The dimensions are the axes of the series. For each combination of values of the
-    # non-adaptive axes, certain values of every adaptive axis are needed, in all combinations.
+    # non-adaptive axes, some values of every adaptive axis are needed, and all combinations of these values.
     cases: BoolArray
 
     @classmethod

@@ -60,7 +60,7 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Map each output in `until` to the output, if any, that contains its standard error within each realisation."""
+    """Map outputs in `until` to those of `outputs` that contain their standard errors within each realisation."""
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 

@@ -228,8 +228,8 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
     Text above the names and below the numbers is left out. A table may consist of several blocks of numbers, each below
     the same line of names. If a temperature is stated above each block, the temperatures become a further column.
-    Groups of columns with the same names that stand side by side are joined one below the other. If cells may be words,
-    the caller must give the function `is_name`, which returns whether a text is the name of a column.
+    If groups of columns with the same names stand side by side, the groups are joined one below the other. If cells may
+    be words, the caller must give the function `is_name`, which returns whether a text is the name of a column.
     """
     grid = _grid(source, list(_lines(text)))
     if is_name is None:
@@ -521,8 +521,8 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
     """Return, for each column of the sheet, its `Column`, its unit, and whether its entries are common logarithms.
 
     The `Column` is one of `columns`, or None for an unknown column of the sheet. In a sheet without names, `columns`
-    describes the columns of the sheet in order. If no name in the sheet means a needed `Column`, an unknown column of
-    the same dimension is taken, unless a second unknown column or a second `Column` has this dimension.
+    describes the columns of the sheet in order. If no name in the sheet means a needed `Column`, the only unknown
+    column with the same dimension is taken, provided that no other `Column` has this dimension.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -603,7 +603,7 @@ def _misspelt(sheet: Sheet, meanings: Sequence[Meaning], absent: Sequence[Column
 
 
 def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -> tuple[Read, list[str]]:
-    """Return the values, in SI, of the columns of the sheet that mean a `Column`, and messages about their problems."""
+    """Return the columns of the sheet that mean a `Column`, converted to SI, and messages about their problems."""
     read, problems, taken = Read(), [], {}
     for place, (column, written, is_logarithm) in enumerate(meanings):
         if column is None:

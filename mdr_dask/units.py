@@ -226,10 +226,10 @@ def seconds(duration: float) -> str:
 
 
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
-    """Return a number without a unit together with the unit in which the number was probably meant.
+    """Find the unit that was probably meant for a number without a unit; return the number with this unit.
 
-    The units of the `usual` values, such as ``"20 mm"``, are tried. The result is the number with the unit that makes
-    it nearest to the first usual value. The result is empty if this is the SI unit.
+    The units of the `usual` values, such as ``"20 mm"``, are tried. The result has the unit with which the number is
+    nearest to the first usual value. The result is empty if this is the SI unit.
     """
     found = {"": _decades(value, unit, usual[0])}
     for each in usual:

@@ -7,8 +7,8 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: For each module with a tuple ``FITS``, the models whose stores the fits of the module accept. An empty tuple means
-#: all models.
+#: The modules that have a tuple ``FITS``, and the models to whose stores the fits of each module apply. An empty tuple
+#: means all models.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),

@@ -26,7 +26,7 @@ APPROXIMATE = 0.15
 #: Deviations count against a law if scatter and errors alone would cause such deviations with a probability below this
 #: value.
 DOUBTFUL = 1 - bootstrap.CONFIDENCE
-#: Solution x of sqrt(1 + x^2) = 1 + `WITHIN`: if x is smaller, 1 is a good approximation of sqrt(1 + x^2).
+#: Largest x for which sqrt(1 + x^2) differs from 1 by at most `WITHIN`.
 SMALL = float(np.sqrt((1 + WITHIN) ** 2 - 1))
 
 
@@ -119,8 +119,8 @@ def fitted(
 
     `fit` returns the constants, shape (rows, p): exponents or logarithms of factors. `left` returns data minus law. If
     scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the residuals.
-    These fits make the intervals wider. The derivatives of the law are computed at the fitted constants and at the
-    `stated` constants. A constant is NaN if it is `undetermined` according to either of them.
+    These fits make the intervals wider. A constant becomes NaN if the derivatives of the law, at the fitted or at the
+    `stated` constants, show that it is `undetermined`.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -192,8 +192,8 @@ def law_holds(
 
     `chance` is the probability that scatter and errors alone cause such deviations. `chance` is NaN if this probability
     is unknown, and None if scatter and errors cannot cause the deviations. `scatter` is the rms deviation that scatter
-    and errors alone exceed with a probability of 5 %. The verdict is not *yes* if `scatter` exceeds `WITHIN`, and
-    neither *yes* nor *approximately* if `scatter` exceeds `APPROXIMATE`.
+    and errors alone exceed with a probability of 5 %. The verdict can be *yes* only if `scatter` is at most `WITHIN`,
+    and *approximately* only if `scatter` is at most `APPROXIMATE`.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
@@ -207,7 +207,7 @@ def law_holds(
         departs = f"departs by {mean} % rms, at most {most} %{f' at {where}' if where else ''}"
         limits = f"limits {limit:g} % and {2 * limit:g} %"
     if np.isnan(scatter) or (chance is not None and np.isnan(chance) and size > limit):
-        return f"not tested: too few realisations for the scatter; {departs}"
+        return f"not tested: too few realisations to estimate the scatter; {departs}"
     if np.isinf(scatter):
         return f"not tested: errors of the results are unknown; {departs}"
     hidden = f"scatter alone may cause {_plain(short(100 * scatter))} % rms"

@@ -28,10 +28,11 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law to the cases along some dimensions, for each combination of values along the remaining dimensions.
+    """Divide the cases of a series into groups, fit a law to each group, and return the results as one Dataset.
 
-    One fit uses all cases along the dimensions that the function `inner` returns. The first output must have no
-    dimensions except the axes of the study and ``realisation``.
+    A group contains all cases along the dimensions that the function `inner` returns. There is one group for each
+    combination of values along the other dimensions. The first output must have no dimensions except the axes of the
+    study and ``realisation``.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -157,9 +158,9 @@ def nonlinear(
 ) -> tuple[Fitted, Variables]:
     """Fit a law to a stack of logarithms, and test the law with the stated and with the fitted constants.
 
-    The function `model` takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1,
-    cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row of `logs`.
-    The constants of the other rows follow by linearisation.
+    The function `model` takes constants, shape (rows, p), and returns the logarithms of the values of the law, shape
+    (rows, cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row of
+    `logs`. The constants of the other rows follow by linearisation.
     """
 
     def misfit(constants: FloatArray) -> FloatArray:

@@ -26,10 +26,10 @@ def laws_of(
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
     """Fit laws of the shift factors. Return the fitted laws, and for each law a sentence on whether the law holds.
 
-    The group of a curve is its value of the quantity that differs between the curves. If the groups are temperatures,
-    the laws are Arrhenius' law and the WLF law of log10 a_T. If the groups are other positive numbers, such as
-    velocities, the law is a power law. All laws are fitted relative to the middle group, so that the fit does not
-    depend on the reference.
+    `result.groups` contains the temperature, or the other number, that distinguishes each curve from the others. If the
+    groups are temperatures, the laws are Arrhenius' law and the WLF law of log10 a_T. If the groups are other positive
+    numbers, such as velocities, the law is a power law. All laws are fitted relative to the middle group, so that the
+    fit does not depend on the reference.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]

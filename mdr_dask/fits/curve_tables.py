@@ -193,7 +193,7 @@ def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, st
 
 
 def require_one_group(frame: pd.DataFrame, used: Sequence[str]) -> None:
-    """Raise DataError if a force, velocity or temperature that is not in the `used` columns varies in a table.
+    """Raise DataError if a column of forces, velocities or temperatures varies although it is not one of `used`.
 
     In a table of moduli against time or frequency, forces and velocities are readings of the instrument and are
     ignored.
@@ -213,7 +213,7 @@ def require_one_group(frame: pd.DataFrame, used: Sequence[str]) -> None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return for each curve the value of `by`, and log10 of its abscissae and ordinates, shape (ordinates, points)."""
+    """Return the value of `by` for each curve, and the points of each curve as log10(abscissa) and log10(ordinates)."""
     rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
     if rows.size == 0 or np.any(rows <= 0):
         names = " and ".join(repr(name) for name in (over, *ordinates))
@@ -226,11 +226,11 @@ def curves_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Divide measured values, which scatter about a few set values, into groups; return the group index of each value.
+    """Divide measured values, which scatter about a few nominal values, into groups; return the group of each value.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. Values that are close to each other, and alternate within one sweep of
-    the abscissa, form one group, because they are rounded readings of one set value.
+    each distinct value is a group of its own. But values that are close to each other form one group, as rounded
+    readings of one nominal value, if they alternate and no abscissa occurs twice in a group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

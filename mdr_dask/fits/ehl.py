@@ -37,8 +37,8 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     freedom = design.shape[0] - int(varied.sum())
     if freedom < 1 or not varied[1:].any():
         raise FitError(
-            "expected film thicknesses at more points than fitted constants, with different W, U or G, got "
-            f"{design.shape[0]} points"
+            "expected more film thicknesses than fitted constants, at different W, U or G, got "
+            f"{design.shape[0]} film thicknesses"
         )
     constants, width = np.full(4, np.nan), np.full(4, np.nan)
     solution, *_ = np.linalg.lstsq(design[:, varied], table[3], rcond=None)

@@ -246,8 +246,8 @@ def _interpolation(data: xr.Dataset) -> Variables:
     used = rising(force, velocity, np.nan_to_num(table.mean()), force >= ZONE_ONE[0])
     if np.count_nonzero(used) < 5 or np.unique(velocity[used]).size < 3:
         raise FitError(
-            f"expected five cases with F_N / (G h L) above {ZONE_ONE[0]}, at three or more velocities up to the largest"
-            f" friction, got {int(used.sum())}"
+            f"expected five cases with F_N / (G h L) above {ZONE_ONE[0]}, at three or more velocities up to the maximum"
+            f" of friction, got {int(used.sum())}"
         )
     force, velocity, count = force[used], velocity[used], table.count(used)
 

@@ -70,7 +70,7 @@ def master_curve(
 
 
 def _largest_offset(found: Superposition, rise: FloatArray) -> str:
-    """Return a text with the largest vertical offset: `rise` minus the vertical factor, relative to the median."""
+    """Return a text with the largest vertical offset: known factor `rise` minus fitted factor, minus the median."""
     offset = rise - found.vertical
     offset -= np.median(offset)
     worst = int(np.argmax(np.abs(offset)))
@@ -195,7 +195,7 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     ]
     rough = [mean for height, mean in means if height > 0]
     if not rough:
-        raise DataError("a force master curve needs a series with roughness that varies normal_force and velocity")
+        raise DataError("expected a series that has roughness and varies normal_force and velocity, got none")
     friction = rough[0]
     for smooth in (mean for height, mean in means if height == 0):
         if all(np.array_equal(smooth[name], friction[name]) for name in wanted):

@@ -27,8 +27,8 @@ MOST = 160_000
 #: Cells are left out if ln(density) is below its maximum by more than this value. The total probability of these cells
 #: is below 1e-5.
 REACH = 14.0
-#: Refinement ends when the variation of ln(density) within a divided cell is less than this value, as a mean over the
-#: divided cells with their probabilities as weights. Chosen by trial.
+#: Refinement ends when ln(density) varies within a divided cell by less than this value on average. The weights of the
+#: average are the probabilities of the cells. Chosen by trial.
 SMOOTH = 0.6
 #: An end of the axis of an unknown is *open* if ln(largest posterior density / density at the end) is less than `OPEN`:
 #: the 95 % interval of the likelihood-ratio test reaches this end.
@@ -144,7 +144,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 def _kept(density: FloatArray, most: int) -> NDArray[np.intp]:
     """Return the indices of the cells that are divided next: all cells of high density, but at least `CELLS` cells.
 
-    If these are more than `most` cells, `most` of these cells are selected at random.
+    If there are more than `most` such cells, `most` of them are selected at random.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(CELLS, density.size))
@@ -167,10 +167,10 @@ def at_ends(found: Posterior) -> FloatArray:
 
 
 def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
-    """Return the indices of the unknowns with an open end, and of the unknowns that depend on these.
+    """Return the indices of the unknowns that have an open end, or that depend on unknowns with an open end.
 
-    An unknown depends on the open ones if knowledge of the open ones would reduce its spread by more than the fraction
-    `APPROXIMATE`.
+    An unknown depends on others if a quadratic function of the others, fitted to the unknown, explains more than the
+    fraction `APPROXIMATE` of its spread.
     """
     free = np.flatnonzero(is_open.any(axis=1)).tolist()
     if not free:
@@ -181,7 +181,7 @@ def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
 
 
 def _reduction(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Return by which fraction a fit of quadratic functions of the unknowns `by` reduces the spread of unknown `k`."""
+    """Fit a quadratic function of the unknowns `by` to unknown `k`; return the fraction of spread that it explains."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)
@@ -202,7 +202,7 @@ class Product(NamedTuple):
 
 
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
-    """Return the products of powers of the undetermined unknowns `free` that the data determine.
+    """Return the products that the data determine. Their factors are powers of the undetermined unknowns `free`.
 
     `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns).
     """
@@ -225,7 +225,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
     done: list[int] = []
     for i in range(len(rows)):
         size = np.abs(rows[i]) * (~np.isin(np.arange(rows.shape[1]), done))
-        lead = int(np.flatnonzero(np.round(3 * size / size.max()))[0])  # smaller ones may be rounded to 0 later
+        lead = int(np.flatnonzero(np.round(3 * size / size.max()))[0])  # a much smaller term may be rounded to 0 later
         rows[i] /= rows[i, lead]
         for j in range(len(rows)):
             if j != i:

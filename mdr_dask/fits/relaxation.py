@@ -37,7 +37,8 @@ WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
 FLOOR = 0.01  # assumed grid error of mu - mu_2, as a fraction of the largest mu - mu_2 (docs/kinetics.md)
 
 TRUSTED = 0.5  # the fit of the power law uses a rate if the half width of the interval of ln(rate) is below this value
-SURE = 0.1  # the fit of the power law has weights 1 / (error of ln(rate)^2 + SURE^2), so that no single rate dominates
+# the weights of the power-law fit are 1 / (e^2 + SURE^2) with the error e of ln(rate), so that no single rate dominates
+SURE = 0.1
 
 TRACE = "friction_coefficient"
 #: Constants that describe the relaxation of a case: the unit and the meaning of each constant.
@@ -134,9 +135,9 @@ def _passing_number(case: xr.Dataset) -> float:
 
 
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the times t', the values, shape (realisations, values), and the grid errors of the mean values.
+    """Return the times t', a table with one row for each realisation, and the grid errors of the means of its columns.
 
-    The values are mu_1, d_mu_0 and mu_2, followed by mu at all times except the first time, which is 0.
+    The columns are mu_1, d_mu_0, mu_2, and mu at all times except the first time, which is 0.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -234,9 +235,9 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return an array whose columns are the stacks of the rates of the cases.
+    """Return an array with one column for each case: the stack of the rate.
 
-    Shorter stacks are padded at their end with their first value.
+    The end of a short stack is filled up with the first value of the stack.
     """
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]

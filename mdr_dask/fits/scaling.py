@@ -249,7 +249,7 @@ def _collapse(data: xr.Dataset) -> Variables:
     loads = np.array([load for load in np.unique(force) if np.count_nonzero(known & (force == load)) >= 3])
     if loads.size < 2:
         raise FitError(
-            f"expected at least two loads, each with three velocities below the maximum of friction, got {loads.size}"
+            f"expected at least two loads, each with three velocities up to the maximum of friction, got {loads.size}"
         )
     used = np.flatnonzero(known & np.isin(force, loads))
     x, curve, count = np.log(velocity[used]), np.searchsorted(loads, force[used]), table.count(used)
@@ -300,7 +300,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "contact_growth",
         MODELS,
-        "L_cont / L = factor (F_N / (G h L))^exponent in zone 1; 1 / (1 + H) by the thesis; mu divided by eq. 3.12",
+        "L_cont / L = factor (F_N / (G h L))^exponent in zone 1 (thesis: exponent 1 / (1 + H)); mu against eq. 3.12",
         lambda series: each(series, load_and_velocity_axes, _contact_growth, "contact_fraction"),
     ),
     Fit(

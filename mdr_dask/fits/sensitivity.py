@@ -25,7 +25,7 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of Saltelli's design, with 95 % intervals.
 
     First-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total indices Jansen (1999).
-    An index is computed from the base points (see `_is_saltelli`) at which all cases that the index needs succeeded.
+    A base point (see `_is_saltelli`) with a failed case is left out of the indices that need this case.
 
     The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
     wide, because points of a Sobol sequence fill space more evenly than random points.

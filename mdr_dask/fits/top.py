@@ -25,7 +25,7 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The maximum of a parabola fitted to the points near the largest friction, of the data and of all resamples.
+    """The maximum of a parabola near the largest friction, fitted to the data and to all resamples.
 
     `height` is the maximum, corrected for its bias. The interval of `height` includes the residuals of the parabola.
     `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum. `rise` is 0 unless
@@ -48,8 +48,8 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    # a parabola through three points has no residuals; the error of the maximum of the parabola is then its distance
-    # from the highest of these points
+    # a parabola through three points has no residuals; the error is then the difference between the maximum of the
+    # parabola and the highest of the three points
     else:
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)

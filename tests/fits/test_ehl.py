@@ -86,7 +86,7 @@ def test_failed_cases_are_left_out() -> None:
 def test_too_few_films_are_refused() -> None:
     enough = film_exponents({"": power_law(GRID[0][:1], GRID[1][:3], GRID[2][:1])})
     assert float(enough["central_speed"]) == pytest.approx(0.692, rel=1e-9)
-    with pytest.raises(FitError, match="more points than fitted constants"):
+    with pytest.raises(FitError, match="more film thicknesses than fitted constants"):
         film_exponents({"": power_law(GRID[0][:1], GRID[1][:2], GRID[2][:1])})
     with pytest.raises(FitError, match="expected the outputs central_film, minimum_film"):
         film_exponents({"": xr.Dataset()})

@@ -192,6 +192,6 @@ def test_a_plateau_that_is_not_reached_has_no_interval(lines, law, end):
 @pytest.mark.parametrize("law", [zone, WRONG["bent"].outputs["friction_coefficient"]])
 def test_one_line_alone_has_no_interval_and_no_verdict(law):
     found = FIT["zone_one"].compute({"": planted(ZONE, 1, 1, (0.0, 0.0), friction_coefficient=law)}).squeeze()
-    assert found["fitted_law_holds"].item().startswith("not tested: too few realisations for the scatter")
+    assert found["fitted_law_holds"].item().startswith("not tested: too few realisations to estimate the scatter")
     assert np.isfinite(found["alpha"])
     assert np.isnan(found["alpha_low"])
