@@ -86,7 +86,8 @@ def _digest(compute: Callable[..., Any]) -> str | None:
     return hashlib.blake2b(code.encode(), digest_size=8).hexdigest()
 
 
-_digest_at_import = lru_cache(_digest)  #: `_own` calls this when it imports a model; the result is cached
+#: `_own` makes the first call, when a model is imported. Later calls return the cached digest.
+_digest_at_import = lru_cache(_digest)
 
 
 @lru_cache(maxsize=1)
@@ -122,7 +123,7 @@ def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[
         try:
             found = function(argument)
             if what == "operations" and not 0 <= float(found) < math.inf:
-                raise ValueError(f"expected a number that is not negative, got {found!r}")
+                raise ValueError(f"expected a finite number that is not negative, got {found!r}")
         except Exception as error:
             raise ModelError(f"the function {what!r} of model {model!r} failed: {reason(error)}") from None
         return found

@@ -1,4 +1,4 @@
-"""The interface of models: a declaration of parameters and outputs, and a pure function that computes a block."""
+"""The interface of models. A model declares its parameters and outputs, and computes a block by a pure function."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
-#: Smallest and largest absolute value of a quantity that is not 0, in SI units. Products of ten such numbers neither
-#: overflow nor underflow.
+#: Smallest and largest allowed absolute value of a quantity in SI units; 0 is allowed, too. Products of ten such
+#: numbers neither overflow nor underflow.
 LEAST, MOST = 1e-30, 1e30
 
 
@@ -92,10 +92,10 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """Declare a physical parameter, as in ``length: float = quantity("m", "length of the line", gt=0)``.
 
     `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as
-    ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. Further values after
-    commas, as in ``"2 GPa, 200 HV"``, show other common units of the quantity. ``check`` asks the user about a
-    number without a unit that would be closer to the first usual value in one of these units. The other arguments,
-    such as ``default``, ``gt`` and ``le``, are passed to :func:`pydantic.Field`.
+    ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. Further values after commas, as in
+    ``"2 GPa, 200 HV"``, show other common units of the quantity. If a campaign gives a number without a unit, and one
+    of these units would bring the value closer to `usual`, ``check`` asks for the unit. The other arguments, such as
+    ``default``, ``gt`` and ``le``, are passed to :func:`pydantic.Field`.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
@@ -108,7 +108,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = usual.split(", ") if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
-    if unit != "m^(1-n)":  # no limits for the coefficient c of a body c r^n: it may have any size
+    if unit != "m^(1-n)":  # the coefficient c of a body c r^n has no limits, because c may have any size
         field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
@@ -139,8 +139,8 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
     return notes
 
 
-#: Number of bits of rounded dimensionless numbers; a double has 53. Numbers with a relative difference of less than
-#: about 6e-14 become equal in most cases and then share one solution.
+#: Dimensionless numbers are rounded to this number of bits; a double has 53 bits. Numbers with a relative difference of
+#: less than about 6e-14 become equal in most cases and then share one solution.
 CANONICAL_BITS = 44
 
 
@@ -173,11 +173,11 @@ class Output:
     * `dims`: dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives the
     coordinates of these dimensions.
     * `default`: whether the output is computed if the campaign names no outputs.
-    * `has_error`: whether the solver estimates the discretisation error. The error is stored as a companion, the output
-    ``<name>_error``, unless the campaign has ``errors: false``.
+    * `has_error`: whether the solver estimates the discretisation error of the output. The error is stored as a second
+    output, the companion ``<name>_error``, unless the campaign has ``errors: false``.
     * `comment`: a limitation of the output, stored as its attribute ``comment``.
-    * `scatter`: name of a second output: the standard error of this output, estimated within each realisation. If
-    errors are stored, the second output is stored, too.
+    * `scatter`: name of another output, which contains the standard error of the output, estimated within each
+    realisation. If errors are stored, this standard error is stored, too.
     * `floor`: a value in the unit of the output, for an output that can be zero. If the absolute value of the output is
     below `floor`, the relative error is the absolute error divided by `floor`.
     * `allow_nan`: whether NaN and infinite values are valid. If `allow_nan` is False, a case of a user's own model
@@ -206,9 +206,9 @@ class Output:
 class Number:
     """A dimensionless number that is computed for each case.
 
-    Users can use its name as a column of a table and in conditions. The module `mdr_dask.questions.expression`
-    evaluates `formula`. The formula may contain outputs, other numbers and parameters. In a formula, the nested
-    parameter ``indenter.angle`` is called ``indenter_angle``.
+    Users can write its name in conditions and as the name of a column in a table. The module
+    `mdr_dask.questions.expression` evaluates `formula`. The formula may contain outputs, other numbers and parameters.
+    In a formula, the nested parameter ``indenter.angle`` is called ``indenter_angle``.
     """
 
     name: str
@@ -327,9 +327,8 @@ class Model(Generic[P]):
     * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
     * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
     campaign.
-    * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
-    * `notes`: notes for ``check`` about a study. The argument is a sequence of parameter sets, each with another
-    value of one of the axes. A nested parameter set can have its own method `notes`.
+    * `notes`: a function that returns notes for ``check`` about a study. The argument is a sequence of parameter sets,
+    one for each tried value of each axis. A nested parameter set can have its own method `notes`.
     """
 
     name: str

@@ -49,7 +49,7 @@ class DataFile(BaseModel):
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note with the columns of a table and the range of each column, if the columns have names."""
+        """Return a note that states the columns of a table and their ranges. Return () if the columns have no names."""
         return _notes_of_file(self)
 
 

@@ -53,7 +53,7 @@ def test_units_change_nothing() -> None:
         np.testing.assert_allclose(there.values[name], here.values[name], rtol=1e-9)
         np.testing.assert_allclose(there.values[f"{name}_thickness"], 0.02 * there.values[name], rtol=1e-14)
     assert np.isnan(here.values["central_film_thickness"]).all()
-    assert "needs the parameter radius" in here.messages[0, 0]
+    assert "needs the parameter `radius`" in here.messages[0, 0]
     assert not there.messages
 
 
@@ -130,7 +130,7 @@ def test_a_film_thicker_than_a_tenth_of_the_radius_is_warned_of() -> None:
         (CHECKED | {"viscosity_law": "roelands"}, "roelands needs the parameter viscosity"),
         (CHECKED | {"speed_parameter": 0.0}, "greater than 0"),
         (CHECKED | {"inlet": 1.0}, "less than 0"),
-        (CHECKED | {"profile_start": 3.0}, "expected profile_end above profile_start 3, got 2"),
+        (CHECKED | {"profile_start": 3.0}, "expected a profile_end above the profile_start 3, got 2"),
     ],
 )
 def test_bad_parameters(given: dict[str, Any], message: str) -> None:

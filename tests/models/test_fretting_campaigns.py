@@ -127,7 +127,7 @@ def test_every_block_of_a_history_is_kept(write):
         ("  stick_radius: 1.2\n", "4:17", "expected a number below 1, got 1.2"),
         ("  stick_radius: .nan\n", "4:17", "expected a finite number, got nan"),
         ("  stick_radius: 0.5\n  friction: 0.3\n", "3:1", "leave out stick_radius or all the others"),
-        ("  path: 2\n  hardness: 2 GPa\n", "3:1", "leave out them, or give contact_modulus"),
+        ("  path: 2\n  hardness: 2 GPa\n", "3:1", "leave out the others, or give contact_modulus"),
         (
             "  stick_radius: 0.5\n  path: 2\n  wear_rule: exact\n",
             "3:1",

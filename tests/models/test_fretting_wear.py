@@ -96,7 +96,7 @@ def test_constant_force():
     for name in ("block_depth", "stick_border"):
         assert found["limit"][name] > found["exact"][name]
     assert found["limit"]["wear_volume"] > 10 * found["exact"]["wear_volume"]
-    with pytest.raises(ValidationError, match="wear_rule fast is for constant depth only"):
+    with pytest.raises(ValidationError, match="`wear_rule: fast` is for constant depth only"):
         FrettingWear(stick_radius=0.5, cycles=0.3, wear_rule="fast", hold="force")
     columns = {"wear_rule": np.array(["fast", "exact"]), "hold": np.array(["force", "force"])}
     mixed = run(FrettingWear(stick_radius=0.5, cycles=0.3), columns)
@@ -156,8 +156,8 @@ def test_table_of_a_ball(tmp_path):
     ("changes", "message"),
     [
         ({"depth": 1e-6}, "either normal_force or depth"),
-        ({"friction": None}, "also friction"),
-        ({"indenter": Cone(shape="cone")}, "also indenter.angle"),
+        ({"friction": None}, "missing: friction"),
+        ({"indenter": Cone(shape="cone")}, "missing: indenter.angle"),
     ],
 )
 def test_bad_parameters(changes, message):

@@ -87,7 +87,7 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"protocol": {"shape": "steps", "times": [0.0, 1.0], "velocities": [1.0]}}, "for each of 2 times"),
+        ({"protocol": {"shape": "steps", "times": [0.0, 1.0], "velocities": [1.0]}}, "for each of the 2 times"),
         ({"protocol": {"shape": "steps", "times": [1.0, 0.5], "velocities": [1.0, 2.0]}}, "increasing times"),
         ({"material": {"kelvin": {"shear_modulus": 1e6, "relaxation_time": 1e-3}}}, "or material"),
     ],

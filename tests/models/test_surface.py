@@ -94,7 +94,11 @@ parameters:
         ("  surface: {spectrum: road.csv}\n", "", "expected length with rms_roughness, or length with surface"),
         ("surface: {spectrum: road.csv}", "profile: road.csv", "write surface: {profile: ...}"),
         ("spectrum: road.csv", "longest_wavelength: 1 mm", "expected spectrum, or "),
-        ("road.csv}", "road.csv, shortest_wavelength: 1 um}", "`extrapolate: true` continues it by a power law"),
+        (
+            "road.csv}",
+            "road.csv, shortest_wavelength: 1 um}",
+            "`extrapolate: true` continues the spectrum by a power law",
+        ),
         ("spectrum: road.csv", "spectrum: low.csv", "low.csv:3: column C2D: expected a value above 0, got '-1 m^4'"),
     ],
 )

@@ -42,7 +42,7 @@ class EhlLineParameters(Parameters):
     settings: ClassVar[frozenset[str]] = frozenset({"profile_start", "profile_end", "profile_points"})
     load_parameter: float | None = quantity(
         "1",
-        "load parameter W = w/(E' R), with the line load w, the radius R and E' = 2 E*, twice the contact modulus",
+        "load parameter W = w/(E' R), with the line load w, the radius R and twice the contact modulus, E' = 2 E*",
         usual="2e-5",
         gt=0,
         default=None,
@@ -127,7 +127,7 @@ class EhlLineParameters(Parameters):
             raise ValueError("viscosity_law: roelands needs the parameter viscosity")
         if self.profile_end <= self.profile_start:
             raise ValueError(
-                f"expected profile_end above profile_start {self.profile_start:.9g}, got {self.profile_end:.9g}"
+                f"expected a profile_end above the profile_start {self.profile_start:.9g}, got {self.profile_end:.9g}"
             )
         return self
 
@@ -140,7 +140,7 @@ OUTPUTS = (
     Output(
         "film",
         "1",
-        "film thickness h/R; behind the end of the film, the gap between the surfaces divided by R",
+        "relative film thickness h/R; behind the end of the film, h is the gap between the surfaces",
         ("position",),
         default=False,
         has_error=True,

@@ -31,7 +31,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Floors (see `solve_film`): the error of a position within the contact is divided by the half width a.
+#: Floors (see `solve_film`). With the floor 1, the error of a spike position inside the contact is divided by the half
+#: width a.
 _FLOORS = {"spike_position": 1.0}
 
 
@@ -99,8 +100,8 @@ def _spike(solution: LineSolution) -> Estimate:
 def compute(block: Block[EhlLineParameters]) -> Result:
     """Solve the cases of a block. All realisations of a case have the same result.
 
-    Cases with the same contact share a solution, even if the sliding differs. If the traction must meet an accuracy,
-    every case is solved separately.
+    Cases with the same contact share a solution, even if their slide-roll ratios differ. If the traction must meet
+    an accuracy, every case is solved separately.
     """
     parameters, contacts = _groups(block), _line_contacts(block)
     formulas = {"formula_central_film": PAN_HAMROCK_CENTRAL, "formula_minimum_film": PAN_HAMROCK_MINIMUM}
@@ -164,15 +165,15 @@ def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[floa
     if {"formula_central_film", "formula_minimum_film"} & set(block.outputs):
         notes.append(PAN_HAMROCK_CENTRAL.outside(*parameters))
     if {"central_film_thickness", "minimum_film_thickness"} & set(block.outputs) and block.case(index).radius is None:
-        notes.append("a film thickness in metres needs the parameter radius; without it only h/R is known")
+        notes.append("a film thickness in metres needs the parameter `radius`; without `radius`, only h/R is known")
     return notes
 
 
 def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of a block.
 
-    The number is proportional to the number of matrix entries in all Newton steps. With an accuracy, the pressure and
-    the position of the spike are assumed to need the finest grid.
+    The number is proportional to the number of matrix entries in all Newton steps. If the campaign gives an accuracy,
+    the pressure and the position of the spike are assumed to need the finest grid.
     """
     is_sharp = block.accuracy is not None and {"pressure", "spike_position"} & set(block.outputs)
     return solution_operations(0.0 if is_sharp else block.accuracy or ACCURACY) * len(set(_line_contacts(block)))

@@ -29,7 +29,12 @@ class Cone(indenter.Cone):
     """A cone."""
 
     angle: float | None = quantity(  # type: ignore[assignment]
-        "rad", "angle between the cone's surface and the plane", usual="10 deg", gt=0, lt=np.pi / 2, default=None
+        "rad",
+        "angle between the cone's surface and the touched plane",
+        usual="10 deg",
+        gt=0,
+        lt=np.pi / 2,
+        default=None,
     )
 
 
@@ -43,10 +48,10 @@ class Power(indenter.Power):
 
 
 class Table(Parameters):
-    """A measured profile in a table with the columns radius and height. Each column has a unit."""
+    """A measured profile: a table with a column `radius` and a column `height`. Each column has a unit."""
 
     shape: Literal["table"]
-    file: NamedFile = Field(description="table with the columns radius and height, each with its unit")
+    file: NamedFile = Field(description='table with the columns "radius" and "height", each with a unit')
 
     @field_validator("file")
     @classmethod
@@ -69,7 +74,7 @@ class Table(Parameters):
 
 
 def profile_columns(file: NamedFile) -> Read:
-    """Return the columns radius and height of a measured profile, in metres, without incomplete rows."""
+    """Return the columns `radius` and `height` of a table, in metres. Incomplete rows are left out."""
     columns = Column("radius", "m", least=0.0), Column("height", "m", ("f",))
     table = read_table(file.read_text(), file.name, columns, allow_missing=True)
     table.leave_out_incomplete()
@@ -94,7 +99,7 @@ class LoadStep(Parameters):
 
 
 #: Message if the fast rule is requested under constant force.
-FAST_AT_DEPTH = "wear_rule fast is for constant depth only: write wear_rule: exact for hold: force"
+FAST_AT_DEPTH = "`wear_rule: fast` is for constant depth only: with `hold: force`, write `wear_rule: exact`"
 _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 #: Parameters of the rate of wear. The limiting profile does not depend on these parameters.
 _OF_RATE = ("hardness", "wear_coefficient")
@@ -103,7 +108,8 @@ _OF_RATE = ("hardness", "wear_coefficient")
 class FrettingWear(Parameters):
     """Parameters of fretting wear, or of sliding wear if a `path` is given.
 
-    With `stick_radius`, or with `path` but no `contact_modulus`, the campaign is dimensionless.
+    A campaign that gives `stick_radius` is dimensionless. A campaign that gives `path` is dimensionless if it does not
+    give `contact_modulus`. All other campaigns are dimensional.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -131,7 +137,7 @@ class FrettingWear(Parameters):
     settings: ClassVar[frozenset[str]] = frozenset({"cells", "extent", "last_radius", "points"})
     requires: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
     indenter: Indenter = Field(
-        Parabola(), description="body before wear; a dimensionless campaign does not need its size"
+        Parabola(), description="body before wear; a dimensionless campaign does not need the size of the body"
     )
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",
@@ -150,8 +156,8 @@ class FrettingWear(Parameters):
     )
     path: float | None = quantity(
         "m",
-        "length l of a sliding path in one direction with gross slip, given in place of cycles and amplitude; in a "
-        "dimensionless campaign, k E* l / (sigma0 a0)",
+        "length l of sliding in one direction with gross slip, given in place of `cycles` and `amplitude`. A "
+        "dimensionless campaign gives the number k E* l / (sigma0 a0) instead, with the hardness sigma0",
         ge=0,
         default=None,
     )
@@ -188,14 +194,14 @@ class FrettingWear(Parameters):
         "1", "relative scatter of the wear coefficient (log-normal)", ge=0, le=2, default=0.0
     )
     history: Annotated[
-        tuple[LoadStep, ...], Field(strict=False, description="blocks of a load history, given in place of cycles")
+        tuple[LoadStep, ...], Field(strict=False, description="blocks of a load history, given in place of `cycles`")
     ] = ()
     extent: float = quantity(
         "1", "last radius of the profiles, divided by the contact radius a0 before wear", gt=0, le=10, default=1.6
     )
     last_radius: float | None = quantity(
         "m",
-        "last radius of the profiles, given in place of extent; the coordinates radius and position are then in m",
+        "last radius of the profiles, given in place of `extent`; the coordinates of the profiles are then in m",
         usual="100 um",
         gt=0,
         default=None,
@@ -223,15 +229,17 @@ class FrettingWear(Parameters):
         oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
         idle = [name for name in oscillating if self.path is not None and getattr(self, name)]
         if idle:
-            raise ValueError(f"path means sliding without oscillation: leave out {', '.join(idle)}")
+            raise ValueError(f"`path` means sliding without oscillation: leave out {', '.join(idle)}")
         if self.dimensionless and given:
             kind = "stick_radius" if self.path is None else "path without contact_modulus"
             raise ValueError(
                 f"expected {kind} or quantities with units, got {kind} and {', '.join(given)}; leave out "
-                f"{'stick_radius or all the others' if self.path is None else 'them, or give contact_modulus'}"
+                f"{'stick_radius or all the others' if self.path is None else 'the others, or give contact_modulus'}"
             )
         if not self.dimensionless and missing:
-            raise ValueError(f"give stick_radius, or for a dimensional campaign also {', '.join(missing)}")
+            raise ValueError(
+                f"expected stick_radius, or all parameters of a dimensional campaign; missing: {', '.join(missing)}"
+            )
         if not self.dimensionless and (self.normal_force is None) == (self.depth is None):
             raise ValueError(
                 f"give either normal_force or depth, got normal_force {self.normal_force!r} and depth {self.depth!r}"

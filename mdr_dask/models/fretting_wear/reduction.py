@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Numbers:
-    """The dimensionless numbers and the units of every case in every realisation, shape (cases, realisations).
+    """The dimensionless numbers and the units. Every array has the shape (cases, realisations).
 
     `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
     stick border. In sliding wear, `level` is 0. `cycles` is the dimensionless number of cycles N, or in sliding wear
@@ -110,8 +110,8 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
         messages.setdefault(
             (int(case), int(position)),
             f"expected an amplitude below mu E* d0 / G*, where gross slip begins, got {times:.9g} times this value: "
-            "lower amplitude, raise friction, depth or normal_force, or give path (sliding in one direction) "
-            "or history (blocks of load) instead of cycles",
+            "lower `amplitude`, or raise `friction` or the load; or replace `cycles` by `path` (sliding in one "
+            "direction) or by `history` (blocks of load)",
         )
     return numbers, messages
 

@@ -35,7 +35,8 @@ _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border"
 #: For each output that has another name in `Worn`, the name in `Worn`. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force", "worn_profile": "height", "worn_image": "image"}
-_FINEST = 1e-5  # smallest tolerance for the error of the worn profile, divided by eta d0; limited by rounding
+#: Smallest tolerance that rounding allows. A tolerance limits the error of the worn profile, divided by eta d0.
+_FINEST = 1e-5
 #: The tolerance of the first solution is this factor times the accuracy. If the first solution misses the accuracy,
 #: the tolerance of each further solution is this factor times the tolerance of the solution before.
 _FINER = 0.25

@@ -67,9 +67,9 @@ class MixedLubrication(Parameters):
     )
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "longest wavelength of the roughness; the pressure on the asperities at a given film is inversely proportional "
-        "to it. auto is the width 2a of the Hertzian contact under cutoff_force. Measured profiles are not "
-        "filtered",
+        "longest wavelength of the roughness. The pressure on the asperities at a given film thickness is inversely "
+        "proportional to this wavelength. auto means the width 2a of the Hertzian contact under cutoff_force. "
+        "Measured profiles are not filtered",
         usual="0.4 mm",
         default="auto",
     )
@@ -83,8 +83,8 @@ class MixedLubrication(Parameters):
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "shortest wavelength of the roughness; auto is ten times the distance between neighbouring points if `points` "
-        "is a number, otherwise the circumference of a roller divided by 100 000",
+        "shortest wavelength of the roughness. If `points` is a number, auto means ten times the distance between "
+        "neighbouring points. If `points` is auto, auto means the circumference of a roller divided by 100 000",
         usual="3 um",
         default="auto",
     )
@@ -101,7 +101,7 @@ class MixedLubrication(Parameters):
     )
     pressure_viscosity: Positive | Literal["oil"] = quantity(
         "1/Pa",
-        "pressure-viscosity coefficient alpha; oil means: computed from the viscosity by the correlation of the oil",
+        "pressure-viscosity coefficient alpha; with oil, alpha is computed from the viscosity by the oil's correlation",
         usual="20 1/GPa",
         default="oil",
     )
@@ -132,8 +132,8 @@ class MixedLubrication(Parameters):
     eyring_stress: float = quantity("Pa", "Eyring stress of the oil", usual="5 MPa", default=5e6, gt=0)
     viscosity_law: Literal["barus", "roelands"] = Field(
         default="barus",
-        description="law by which the viscosity grows with the pressure; it is used for friction, and for the film if "
-        "film_formula is ehl",
+        description="law by which the viscosity grows with the pressure. Friction always depends on this law; the film "
+        "depends on this law only with film_formula: ehl",
     )
     trace_points: int = quantity(
         "1", "number of angles in one revolution at which contact_length_trace is stored", default=3600, ge=2, le=10**6
@@ -202,9 +202,9 @@ class MixedLubrication(Parameters):
         one, two = self.surface_1, self.surface_2
         if one is None and two is None:
             missing = self.rms_roughness is None or self.hurst is None
-            return "expected rms_roughness and hurst, or surface_1 and surface_2, got neither" if missing else ""
+            return "expected rms_roughness with hurst, or surface_1 with surface_2, got neither" if missing else ""
         if one is None or two is None:
-            return "expected both surface_1 and surface_2 or neither, got one"
+            return "expected surface_1 and surface_2 together, got only one of them"
         if (one.profile is None) != (two.profile is None):
             return "expected profiles for both rollers or spectra for both, got one of each"
         if one.profile is None and self.rms_roughness is not None:
@@ -272,7 +272,7 @@ OUTPUTS = (
     Output(
         "contact_conductance",
         "S",
-        "mean electrical conductance of all contact spots across the width of the rollers",
+        "electrical conductance of all contact spots across the rollers together, averaged over one revolution",
         default=False,
         has_error=True,
     ),

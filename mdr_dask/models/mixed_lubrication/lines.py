@@ -27,12 +27,13 @@ def points_for(modes: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Generated:
-    """Two lines with random phases: self-affine with unit rms height, or in m with the spectra of measured surfaces.
+    """Two lines with random phases.
 
-    `points` is the number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
-    `length` is the circumference of a roller in m. `longest` is this length divided by the longest wavelength, and
-    `modes` is the length divided by the shortest wavelength. `roughness` is the Hurst exponent or the two surfaces. If
-    a measured surface has several files, the realisations use these files in turn.
+    If `roughness` is a Hurst exponent, the lines are self-affine with the rms height 1. If `roughness` contains two
+    measured surfaces, the lines have the spectra of these surfaces and heights in m. If a surface has several files,
+    the realisations use these files in turn. `points` is the number of points of each grid, from coarse to fine. The
+    lines have the same waves on every grid. `length` is the circumference of a roller in m. `longest` is this length
+    divided by the longest wavelength, and `modes` is this length divided by the shortest wavelength.
     """
 
     points: tuple[int, ...]
@@ -45,7 +46,7 @@ class Generated:
         """Return the reason why the lines cannot be made, or an empty string."""
         if self.longest > self.modes:
             longest, shortest = self.length / self.longest, self.length / max(self.modes, 1)
-            return f"expected the longest wavelength above the shortest, got {longest:.9g} m and {shortest:.9g} m"
+            return f"expected a longest wavelength above the shortest wavelength {shortest:.9g} m, got {longest:.9g} m"
         if 2 * self.modes > self.points[-1]:
             wave, least = self.length / self.modes, 2 * self.length / self.points[-1]
             return f"expected a shortest wavelength of at least two point spacings, {least:.9g} m, got {wave:.9g} m"
@@ -119,7 +120,7 @@ class Measured:
         return ""
 
     def note(self) -> str:
-        """Return a text with the number of points, the length and the rms heights of the lines before any scaling."""
+        """Return a text that states the number of points, the length and the rms heights of the unscaled lines."""
         first, second = (shown(float(line.std()), "m") for line in self._levelled())
         return (
             f"both profiles are used without tilt, with {self.points[-1]} points over {shown(self.length, 'm')}; "
@@ -131,7 +132,7 @@ class Measured:
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
-        """Return the interpolating splines of both lines, shape (2, points), through all points or every second point.
+        """Return the splines of both lines through all points, or through every second point, shape (2, points).
 
         During one revolution at the mean velocity, with a slide-roll ratio S, the contact travels (1 + S/2) times the
         length of line 1, and (1 - S/2) times the length of line 2. The contact thus passes some points more often than

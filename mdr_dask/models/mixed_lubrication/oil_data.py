@@ -38,8 +38,8 @@ class OilData(Parameters):
     )
     viscosities: NamedFile | None = Field(
         default=None,
-        description="table with the columns temperature and kinematic viscosity (or dynamic viscosity), in place of "
-        "the two viscosities; Walther's law is fitted to the table",
+        description='table with the columns "temperature" and "kinematic viscosity" (or "dynamic viscosity"), given in '
+        "place of the two viscosities; Walther's law is fitted to the table",
     )
     density: float = quantity(
         "kg/m^3", "density of the oil at density_temperature", usual="870 kg/m^3, 0.87 g/cm^3", gt=0

@@ -1,4 +1,4 @@
-"""The smooth rollers of a case: Hertzian contact, oil film, load shares of film and asperities, and friction."""
+"""Results for the smooth rollers of a case: Hertzian contact, oil film, load sharing and friction."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
         film = case.film_thickness
         share = _asperity_share(case, rms, film)
         if share > 1:
-            share, warning = 1.0, "at the given film thickness, asperities would carry more than the load"
+            share, warning = 1.0, "at the given film thickness, asperities would carry more than the whole load"
     else:
         by_solution = case.film_formula == "ehl"
         film_at = film_by_solution if by_solution else film_by_formula

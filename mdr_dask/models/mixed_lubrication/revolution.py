@@ -17,7 +17,8 @@ from mdr_dask.physics.surfaces.splines import heights
 
 #: Largest number of parts of a revolution. The scatter between the parts gives the standard error.
 PARTS = 16
-WINDOWS = 4  # with sliding: width of a window divided by the distance between windows on the coarsest grid, by trial
+#: Width of a window divided by the distance between windows, for sliding rollers on the coarsest grid; chosen by trial.
+WINDOWS = 4
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 
-# Relative accuracy of friction if the campaign does not give one. Friction scatters more between surfaces.
+# Relative accuracy of friction if the campaign gives no accuracy. Friction on different surfaces differs by more.
 ACCURACY = 0.01
 
 
@@ -23,9 +23,9 @@ def missed_accuracy(
     """Return a message for every case in which an output misses the accuracy. The key is the index of the case.
 
     The relative error of an output is the largest absolute error in the case, divided by the largest absolute value in
-    the case. If this value is below the floor of the output, the error is divided by the floor. `values` and `errors`
-    have the shape (cases, ...). Elements that are NaN in `values` or in `errors` are ignored. The text `where` is added
-    to the messages, such as ``" on the finest grid"``.
+    the case, or by the floor of the output if the floor is larger. `values` and `errors` have the shape (cases, ...).
+    Elements that are NaN in `values` or in `errors` are ignored. The text `where`, such as ``" on the finest grid"``,
+    is added to the messages.
     """
     shares = {
         name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()

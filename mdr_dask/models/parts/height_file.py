@@ -63,8 +63,8 @@ def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]
     """Return the map in a file, and remarks on how the file was read.
 
     The file is a text, an npy file, or a file that SurfaceTopography can read. Each row of a text or npy file contains
-    the heights along x at one y. A row of a text may instead contain x, y and z of a point. In the map, missing points
-    are NaN. `units` are the units and spacings that the user states.
+    the heights along x at one y. Each row of a text may instead contain the coordinates x, y and z of one point. In the
+    map, missing points are NaN. `units` are the units and spacings that the user states.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -137,8 +137,8 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
     Unit and spacings are taken from the file or from the options of the user. If the unit of the positions is missing
     and the user states the spacing, the unit is taken as the power of ten of a metre that fits the spacing. For
-    positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... are then taken as indices
-    of points.
+    positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... without a unit are taken
+    as indices of points.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -176,7 +176,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
     if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > AGREE:
         raise DataError(
-            f"{file.name}: the file states {stated}, got {given!r}: leave out `{option}` or correct the file"
+            f"{file.name}: the file states the unit {stated}, got {given!r}: leave out `{option}` or correct the file"
         )
     return stated or given
 
@@ -480,6 +480,6 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
         return x, z
     if units.spacing is None:
         raise DataError(
-            f"{file.name}: expected a column x: name the column, or give `spacing`, the distance between heights"
+            f"{file.name}: expected a column 'x': name the column, or give `spacing`, the distance between points"
         )
     return np.asarray(units.spacing * np.arange(z.size), dtype=np.float64), z

@@ -43,7 +43,7 @@ class Cone(_PowerLaw):
 
     shape: Literal["cone"]
     angle: float = quantity(
-        "rad", "angle between the surface of the cone and the plane that it touches", usual="10 deg", gt=0, lt=np.pi / 2
+        "rad", "angle between the surface of the cone and the touched plane", usual="10 deg", gt=0, lt=np.pi / 2
     )
 
     def power_law(self) -> tuple[float, float]:

@@ -56,7 +56,7 @@ class Steps(_History):
     def _rows(self) -> Steps:
         times, forces = self.times, self.forces
         if len(self.velocities) != len(times) or (forces is not None and len(forces) != len(times)):
-            raise ValueError(f"expected a velocity and a force for each of {len(times)} times")
+            raise ValueError(f"expected a velocity and a force for each of the {len(times)} times")
         if times[0] < 0 or any(b <= a for a, b in pairwise(times)):
             raise ValueError(f"expected increasing times that are not negative, got {times!r}")
         if forces is not None and min(forces) <= 0:
@@ -99,7 +99,7 @@ class TableFile(_History):
     """Velocity and load from a table, interpolated linearly between rows. Two rows with the same time give a jump."""
 
     shape: Literal["table"]
-    file: NamedFile = Field(description="table with the columns time and velocity, and optionally force")
+    file: NamedFile = Field(description='table with the columns "time", "velocity" and, optionally, "force"')
 
     @model_validator(mode="after")
     def _holds_a_history(self, info: ValidationInfo) -> TableFile:
@@ -146,7 +146,7 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
             raise DataError(
                 f"{protocol.file.name}: the first of two rows at t = 0 states the velocity and the force before t = 0: "
                 f"expected {before[0]:g} m/s and {before[1]:g} N, got {rows[0][1]:g} m/s and {rows[0][2]:g} N; "
-                "correct that row, or the parameters velocity, normal_force and start"
+                "correct that row, or the parameters `velocity`, `normal_force` and `start`"
             )
     found = [Piece(a[0], b[0], (a[1], b[1]), (a[2], b[2])) for a, b in pairwise(rows) if b[0] > a[0]]
     end = rows[-1]

@@ -116,7 +116,7 @@ class Material(Parameters):
             raise ValueError(f"expected one of {', '.join(LAWS)}, got {' and '.join(laws)}")
         superposing = self.dma_table is not None and self.dma_table.table_temperature is None
         if (self.temperature is not None and not laws) or (self.temperature is None and laws and not superposing):
-            hint = " (`mdr-dask master-curve` finds wlf from a table; or vary reference of dma_table instead)"
+            hint = " (`mdr-dask master-curve` computes wlf from a table; or vary the option reference of dma_table)"
             raise ValueError(
                 f"expected a temperature together with one of {', '.join(LAWS)}: give both or neither"
                 f"{'' if self.dma_table is None or laws else hint}"
@@ -125,7 +125,7 @@ class Material(Parameters):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on the error of a fitted Prony series and a temperature outside a table."""
+        """Return notes on the error of a fitted Prony series, and on a temperature outside a table."""
         return (*fit_notes(self), *_table_notes(self))
 
 

@@ -19,7 +19,7 @@ class ProfileFile(NamedByFile):
     """A measured height profile. The user writes only the name of a file, or `file: name` with options."""
 
     file: NamedFile = Field(
-        description="file with two columns x, z; SurfaceTopography reads other formats if it is installed"
+        description='file with the columns "x" and "z"; other formats need the package SurfaceTopography'
     )
     unit: str = UNIT
     x_unit: str = X_UNIT
@@ -29,7 +29,8 @@ class ProfileFile(NamedByFile):
     )
     taper: float = quantity(
         "1",
-        "fraction of the line, half of it at each end, in which the heights fade to their mean, so that the ends meet",
+        "fraction of the line in which the heights fade to their mean, so that both ends meet; each end has half of "
+        "this fraction",
         default=0.0,
         ge=0,
         le=1,

@@ -1,4 +1,4 @@
-"""Parameters of a table from a dynamic mechanical analysis, and the computation of one curve of moduli from it."""
+"""Parameters of a table of moduli from a dynamic mechanical analysis, and computation of one curve of moduli."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Read, read_sheet, read_table
 from mdr_dask.units import shown
 
-#: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
+#: Patterns for the names of columns with moduli in tension, or with moduli in shear. `plain` simplifies a name first.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
 #: Pairs of columns. Each pair determines storage and loss modulus.
@@ -33,8 +33,8 @@ class ModulusTable(NamedByFile):
 
     renamed: ClassVar[Mapping[str, str]] = {"arms_per_decade": "write terms_per_decade"}
     file: NamedFile = Field(
-        description="table with the columns frequency, storage modulus, and loss modulus or tan delta (or complex "
-        "modulus and phase angle); optionally temperature"
+        description='table with a column "frequency" and one pair of columns: "storage modulus" and "loss modulus", '
+        '"storage modulus" and "tan delta", or "complex modulus" and "phase angle"; a column "temperature" is optional'
     )
     frequency_unit: str = Field(default="", description="unit of the frequencies, if the table does not state it")
     modulus_unit: str = Field(default="", description="unit of the moduli, if the table does not state it")
@@ -121,8 +121,8 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
     if temperature is None:
         if chosen.reference is not None:
             raise DataError(
-                f"{chosen.file.name}: expected a column 'temperature', because `reference` is given: add it, or "
-                "give `table_temperature` instead if all rows were measured at one temperature"
+                f"{chosen.file.name}: expected a column 'temperature', because `reference` is given: add the column; "
+                "if all rows were measured at one temperature, give `table_temperature` in place of `reference`"
             )
         only = chosen.table_temperature
         return Moduli(omega, storage, loss, only, None if only is None else (only, only))
@@ -143,8 +143,8 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
         shift, rise = law.factor(levels), vertical_factor(chosen, levels, reference)
     else:
         raise DataError(
-            f"{chosen.file.name}: has several temperatures: choose one by table_temperature, or superpose them by "
-            "giving a reference temperature or a law (wlf, arrhenius or shift_factors)"
+            f"{chosen.file.name}: has several temperatures: choose one by `table_temperature`, or superpose the "
+            "curves by giving `reference` or a law (`wlf`, `arrhenius` or `shift_factors`)"
         )
     text = f"superposed at {shown(reference, 'K')} by {text}"
     return Moduli(omega * shift[member], storage * rise[member], loss * rise[member], reference, ends, text)
@@ -155,7 +155,7 @@ def _near(temperature: FloatArray, wanted: float) -> FloatArray:
 
 
 def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the index of the temperature of every row, and the distinct temperatures in ascending order."""
+    """Return, for every row, the index of its temperature, and then the distinct temperatures in ascending order."""
     order = np.argsort(temperature, kind="stable")
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
@@ -174,7 +174,7 @@ def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: fl
 
 
 def _vertical(chosen: ModulusTable) -> str:
-    """Return a text on whether moduli are multiplied by b_T and, if they are, on the thermal expansion in b_T."""
+    """Return a text that says whether moduli are multiplied by b_T, and that states the thermal expansion in b_T."""
     from mdr_dask.physics.superposition.master_curve import EXPANSION
 
     if chosen.vertical == "none":
@@ -280,7 +280,7 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
     if temperature is not None and wanted is not None and np.count_nonzero(_near(temperature, wanted)) < 2:
         _, levels = _levels(temperature)
         known = ", ".join(shown(level, "K") for level in levels[:12])
-        raise DataError(f"{name}: got no rows at {shown(wanted, 'K')}; the table was measured at {known}")
+        raise DataError(f"{name}: expected two or more rows at {shown(wanted, 'K')}; the table was measured at {known}")
     heading, others = table.headings["storage modulus"], read_sheet(chosen.file.read_text(), name).names
     is_shear = bool(_IN_SHEAR.search(plain(heading)))
     if is_shear and chosen.poisson_ratio is not None:

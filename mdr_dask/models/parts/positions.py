@@ -11,7 +11,7 @@ from mdr_dask.physics.refine import SAFETY
 from mdr_dask.tables import AGREE
 from mdr_dask.units import shown
 
-OUTER = 2  # largest number of rows or columns with positions or row numbers on one side of a table
+OUTER = 2  # at most so many rows (or columns) at each edge of a table contain positions or row numbers
 FEW_LEVELS = 10  # largest number of distinct heights of a designed surface such as a grating, chosen by trial
 
 

@@ -98,7 +98,9 @@ class SlidingBody(Parameters):
         elif both:
             raise ValueError(f"surface replaces {', '.join(both)}: leave out surface, or {', '.join(both)}")
         elif self.surface.profile is not None and self.length is not None:
-            raise ValueError("the length of surface: {profile: ...} comes from its file: leave out length")
+            raise ValueError(
+                "leave out `length`, because the file of `surface: {profile: ...}` determines the length of the line"
+            )
         elif self.surface.profile is None and self.length is None:
             raise ValueError("expected length, the length of the rough line that represents the surface, got none")
         self.require_one_alternative()

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 
-NO_AREA = "contact length of the line; it does not give the contact area of a rough surface (docs/validity.md)"
-NO_GAP = "approach of the line; it does not give the mean separation or the gaps of a rough surface (docs/validity.md)"
+NO_AREA = "contact length of the line, not the contact area of a rough surface (docs/validity.md)"
+NO_GAP = "approach of the line, not the mean separation or the gaps of a rough surface (docs/validity.md)"
 
 
 class Surface(Parameters):
@@ -113,9 +113,10 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the parameters `value` of a campaign. Add ``hurst: None`` if they contain a surface named `surface`.
+    """Return the parameters `value` of a campaign. If they include a measured surface, add ``hurst: None``.
 
-    The default of `hurst` is for generated roughness only. If `value` contains `hurst`, this number is kept.
+    `surface` is the name of the parameter that contains the surface. If `value` already contains `hurst`, nothing is
+    added. The default of `hurst` is for generated roughness only.
     """
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
@@ -146,7 +147,7 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
             limit = f"most {shown(longest, 'm', 9)}" if end > longest else f"least {shown(shortest, 'm', 9)}"
             beyond.append(
                 f"{file.name}: expected {name} of at {limit}, where the spectrum ends, got {shown(end, 'm', 9)} "
-                "(`extrapolate: true` continues it by a power law)"
+                "(`extrapolate: true` continues the spectrum by a power law)"
             )
     if beyond:
         raise DataError("; ".join(beyond))

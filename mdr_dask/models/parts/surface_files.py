@@ -136,7 +136,7 @@ class MapFiles(HeightFiles):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with column names of a spectrum. A single one-letter name is not enough."""
+    """Return whether a text begins with column names of a spectrum. A single name must have two letters or more."""
     try:
         sheet = read_head(text)
     except DataError:
@@ -229,7 +229,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 def mapped(maps: MapFiles, file: DataFile) -> Found:
     """Return the spectrum of one map, averaged over all directions.
 
-    With `direction`, use profiles along this direction.
+    If the user gives a `direction`, compute the spectrum from profiles along this direction instead.
     """
     from mdr_dask.physics.surfaces.scans import averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit

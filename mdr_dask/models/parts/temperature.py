@@ -58,8 +58,8 @@ class ShiftFactors(NamedByFile):
     """Measured shift factors. The user writes only the name of a file, or `file: name`."""
 
     file: NamedFile = Field(
-        description="table with the columns temperature, and a_T or log10 a_T; the values of a_T must include or "
-        "enclose 1"
+        description='table with a column "temperature" and a column "a_T" or "log10 a_T"; the value 1 must lie within '
+        "the range of a_T"
     )
 
     @model_validator(mode="after")
@@ -80,7 +80,7 @@ class ShiftFactors(NamedByFile):
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
             got, first, last = (shown(float(each), "K", 9) for each in (outside, known[0], known[-1]))
             raise ValueError(
-                f"{self.file.name}: expected a temperature within the shift factors, {first} to {last}, got {got}"
+                f"{self.file.name}: expected a temperature in the range of the table, {first} to {last}, got {got}"
             )
         return np.asarray(10 ** np.interp(wanted, known, decades), dtype=np.float64)
 
@@ -104,7 +104,7 @@ def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
         )
     if not decades[-1] <= 0 <= decades[0]:
         raise DataError(
-            f"{name}: expected values of a_T that include or enclose 1, the value at the reference temperature"
+            f"{name}: expected a range of a_T that contains 1, which is the value at the reference temperature"
         )
     return temperature, decades
 

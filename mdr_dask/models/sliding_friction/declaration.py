@@ -18,8 +18,8 @@ class SlidingFriction(SlidingBody):
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling"})
     oversampling: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = quantity(
         "1",
-        "grid points per point of the rough line (`points`). 1 gives the grid of the original papers; with auto, the "
-        "grid is refined until the accuracy is reached",
+        "number of grid points divided by `points`, the number of points of the rough line. 1 gives the grid of the "
+        "original papers; with auto, the grid is refined until the accuracy is reached",
         default="auto",
     )
     scheme: Literal["hermite", "backward_euler"] = Field(

@@ -28,7 +28,7 @@ class VelocityJump(SlidingBody):
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
         "1",
-        "grid points per point of the rough line (`points`), for the time after the jump",
+        "number of grid points after the jump divided by `points`, the number of points of the rough line",
         default=4,
         ge=2,
         le=256,

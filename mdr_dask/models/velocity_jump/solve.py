@@ -42,8 +42,9 @@ from mdr_dask.physics.transients.elements.foundation import Foundation, foundati
 from mdr_dask.physics.transients.elements.loading_history import Piece, Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
-# Numbers of operations, chosen by trial, for block sizes. A jump needs `OPERATIONS_MARCHED` times the nodes and the
-# time steps per decade. In a history, each spring and each mode needs `OPERATIONS_FOLLOWED` per element and time step.
+# Numbers of operations, chosen by trial, for block sizes. A jump needs `OPERATIONS_MARCHED` operations, times
+# the nodes, times the time steps per decade. A history needs `OPERATIONS_FOLLOWED` operations for each time step and
+# each spring or mode of an element.
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 100
 
 #: Names of the outputs for which errors are estimated.
