@@ -31,7 +31,7 @@ MOST_SHARED = 30 * OPERATIONS
 #: If cases share work, blocks of at most `MOST_SHARED` operations are halved only if the operations of all blocks
 #: together increase by less than this factor.
 REPEATED_WORK = 1.15
-#: The operations of at most this number of blocks of a series are counted, so that `check` is fast. Chosen by trial.
+#: Largest number of blocks of a series whose operations are counted; it keeps `check` fast. Chosen by trial.
 SAMPLED = 1000
 #: Largest number of records in one file. A file with this number of records has about a megabyte.
 RECORDS_TOGETHER = 1000
@@ -129,7 +129,7 @@ class Template:
         return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
     def _operations(self, block: Block[Any]) -> float:
-        """Return the operations of a block, estimated from numbers of results if the model cannot count operations."""
+        """Return the operations of a block, counted by the model or else estimated from the number of results."""
         count = models.load(self.campaign.model).operations
         if count is not None:
             return count(block)

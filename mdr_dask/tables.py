@@ -359,7 +359,7 @@ def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     A column is numeric if at least half of the lines with the most frequent number of cells have a number in this
     column. A line contains numbers if at least half of its filled cells in numeric columns are numbers or marks of
     missing numbers. A line that begins with a word is text if the word is in a numeric column, or if less than half of
-    the columns are filled. With exactly half of the columns filled, the line is text if most lines have more cells.
+    the columns are filled. With exactly half of the columns filled, such a line is text if most lines have more cells.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # every line has more words than numbers
@@ -659,7 +659,7 @@ def _unit(written: str, column: Column) -> str:
 def _values(
     sheet: Sheet, place: int, column: Column, unit: str, is_logarithm: bool, allow_missing: bool
 ) -> tuple[FloatArray, list[str]]:
-    """Return the values of a column in SI, and a list that contains the first problem or is empty."""
+    """Return the values of a column in SI, and a list with a message about the first problem, or an empty list."""
     before, factor, zero = factors(unit, column.unit)
 
     def in_si(text: str) -> float:

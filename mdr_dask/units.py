@@ -229,7 +229,7 @@ def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     """Find the unit that was probably meant for a number without a unit; return the number with this unit.
 
     The units of the `usual` values, such as ``"20 mm"``, are tried. The result has the unit with which the number is
-    nearest to the first usual value. The result is empty if this is the SI unit.
+    nearest to the first usual value. The result is empty if the SI unit fits best.
     """
     found = {"": _decades(value, unit, usual[0])}
     for each in usual:

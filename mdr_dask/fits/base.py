@@ -34,8 +34,8 @@ SMALL = float(np.sqrt((1 + WITHIN) ** 2 - 1))
 class Fit:
     """A law that ``mdr-dask fit STORE NAME`` fits to the stores of some `models`; an empty tuple means all models.
 
-    `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
-    realisation, ...), and all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 %
+    `compute` takes the series of a store, indexed by name. A series has the dimensions (axes..., realisation, ...), and
+    all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 %
     intervals of the constants (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``.
     The attrs contain the units. If `apart` is true, `compute` takes one series at a time.
     """
@@ -163,8 +163,8 @@ def verdict(
     """Return a sentence on whether a law holds, from a stack of the relative deviations of the data from the law.
 
     `constants` is the number of constants that were fitted to the data. ``where(k)`` describes case k in words.
-    `excluded` is true if the interval of a fitted constant does not contain the stated value. In this case, the
-    deviations are not due to scatter.
+    `excluded` is true if the interval of a fitted constant does not contain the stated value; scatter then does not
+    explain the deviations.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)

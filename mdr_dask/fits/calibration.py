@@ -172,8 +172,8 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
     """Return possible measurement errors that are about as large as the residuals.
 
-    In the first item, the errors of all points have the same size. If all measured values are
-    positive, a second item has errors that are proportional to the predicted values.
+    In the first item of the result, the errors of all points have the same size. If all measured values are positive, a
+    second item has errors that are proportional to the predicted values.
     """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
@@ -210,7 +210,7 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
 
 
 def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
-    """Return the measured points stored with a study; if the table has several outputs, use one of `wanted`."""
+    """Return the measured points stored with a study; if they have several outputs, use the one in `wanted`."""
     table = dataset.attrs.get("measured")
     if not table:
         raise FitError(

@@ -77,7 +77,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
 
 
 def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
-    """Return the constants of the laws, the intervals of the constants, and the rms distance from each law."""
+    """Return the constants of the laws, their intervals, and the rms distance of the shift factors from each law."""
     units = {"activation_energy": "J/mol", "c2": "K"}
     meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
     found = {}

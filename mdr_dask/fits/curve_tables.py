@@ -70,7 +70,7 @@ def _with_moduli(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
-    """Return a table unchanged. Convert a study into a table of means over realisations, one row for each case."""
+    """Convert a study into a table of means over realisations, one row for each case. Return a table as it is."""
     if isinstance(table, pd.DataFrame):
         return table
     mean = table.mean("realisation", keep_attrs=True) if "realisation" in table.dims else table

@@ -52,7 +52,7 @@ class Scale:
 
 
 def dense(axes: Sequence[FloatArray], size: int) -> list[FloatArray]:
-    """Divide each interval between neighbouring values of an axis into equal steps. Return given and new values.
+    """Divide each interval between neighbouring values of an axis into equal steps; return old and new values.
 
     The steps are equal on the scale that `Scale.of` chooses for an axis. `size` is the number of values in the table of
     computed values.
@@ -93,7 +93,7 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Estimate the error of interpolation at every value of an axis (`places`) by leaving out every second value.
 
-    `table` contains numbers converted to `scale`. The result is the error of the numbers before this conversion. Each
+    `table` contains numbers converted to `scale`. The result is the error of the unconverted numbers. Each
     error is the largest of three estimates: at the value itself and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)

@@ -70,7 +70,7 @@ def master_curve(
 
 
 def _largest_offset(found: Superposition, rise: FloatArray) -> str:
-    """Return a text with the largest vertical offset: known factor `rise` minus fitted factor, minus the median."""
+    """Return a text with the largest vertical offset: known (`rise`) minus fitted factor, relative to the median."""
     offset = rise - found.vertical
     offset -= np.median(offset)
     worst = int(np.argmax(np.abs(offset)))

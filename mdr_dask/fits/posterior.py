@@ -237,7 +237,8 @@ def _reduced(rows: FloatArray) -> FloatArray:
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
     """Return the product of powers; exponents are rounded to integers, halves or thirds, or to two decimals.
 
-    Fractions are used if the spread of the product then increases by at most `APPROXIMATE`.
+    Integers are tried first. A rounding is accepted if the spread of the product then increases by at most the fraction
+    `APPROXIMATE`.
     """
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):

@@ -76,7 +76,7 @@ def tried_rates(time: FloatArray) -> FloatArray:
 
 
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fit one exponential to each trace, shape (n, m), by weighted least squares; return rates and amplitudes.
+    """Fit one exponential to each trace (a row of `traces`) by weighted least squares; return rates and amplitudes.
 
     The sum of squares is computed for each of the `tried_rates`, with the best amplitude for this rate. A parabola
     through the sums of squares at the best rate and at its two neighbours refines the rate to a relative error of about

@@ -97,8 +97,8 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
     `fraction` is the length in contact divided by the length of the line. Only waves that are shorter than the length
-    in contact count. If no wave is shorter, the result is NaN. The line has `points` points, and the shortest wave is
-    as long as two spacings of the points.
+    in contact contribute. If there is no such wave, the result is NaN. The line has `points` points, and the shortest
+    wave is as long as two spacings of the points.
     """
     power = 2 * (1 - hurst)
     # wave numbers of the longest and the shortest wave, 2 pi / L_cont and q_max, both divided by 2 pi / L

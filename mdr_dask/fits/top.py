@@ -27,7 +27,7 @@ def smoothed(mean: FloatArray) -> FloatArray:
 class Top(NamedTuple):
     """The maximum of a parabola near the largest friction, fitted to the data and to all resamples.
 
-    `height` is the maximum, corrected for its bias. The interval of `height` includes the residuals of the parabola.
+    `height` is the maximum, corrected for its bias. The interval of `height` is wider if the residuals are large.
     `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum. `rise` is 0 unless
     the maximum is at an end of the fitted range.
     """
