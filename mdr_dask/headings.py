@@ -155,8 +155,8 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
     others = [column for column in columns if column.holds(name)]
     for alike in ([column for column in rank if _agrees(unit, column)] for rank in (exact[:1], synonyms, others)):
         if len(alike) > 1:
-            several = " or ".join(column.name for column in alike)
-            raise ValueError(f"expected the name of one quantity, got {name!r}, which may be {several}")
+            several = " or ".join(repr(column.name) for column in alike)
+            raise ValueError(f"expected the name of one quantity, got {name!r}, which may mean {several}")
         if alike:
             return alike[0], unit
     if found := exact or synonyms or ([] if unit else others):  # the unit is wrong or missing

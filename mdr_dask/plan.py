@@ -241,7 +241,7 @@ def templates(
             where = f"series.{series.name}" if series.name else "parameters"
             problems.append(
                 f"{campaign.source}: {where}: {counts} results need about {needed / 2**30:.4g} GiB of memory, "
-                f"expected at most the {limit / 2**30:.4g} GiB of this machine"
+                f"but this machine has {limit / 2**30:.4g} GiB: reduce the number of results"
             )
             continue
         outputs = _outputs(campaign, series, model)

@@ -55,7 +55,7 @@ def read(source: Source) -> Campaign:
     if isinstance(source, Mapping):
         return of_keys(source)
     if not isinstance(source, str | Path):
-        raise CampaignError(f"expected the keys of a campaign file or its path, got {type(source).__name__}")
+        raise CampaignError(f"expected the keys or the path of a campaign file, got {type(source).__name__}")
     return campaign.load(source)
 
 
@@ -434,7 +434,7 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
         return store.datasets(str(study))
     for data in found.values():
         if "status" not in data or "realisation" not in data["status"].dims:
-            kept = "with its status and realisations (isel(realisation=[0]) keeps a single realisation)"
+            kept = "with 'status' and the dimension 'realisation' (which isel(realisation=[0]) keeps)"
             raise DataError(f"expected a study as returned by run or open, {kept}, got a Dataset without them")
     return found
 

@@ -134,7 +134,7 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
         times = " to ".join(dict.fromkeys(seconds(max(count * costs.seconds, 1.0)) for count in (1, more)))
         yield f"about {times} on one core: an estimate from a count of operations, not a measurement on this machine"
     if more > 1:
-        yield "ranges: from the first round to the last one, if no case meets its tolerance earlier"
+        yield "ranges: the first number is for the first round, the second one for all rounds"
 
 
 def human_bytes(size: float) -> str:

@@ -133,7 +133,7 @@ def decoded(content: bytes, source: str) -> str:
         text = content.decode("cp1252", errors="replace")
         # four consecutive characters outside ASCII do not occur in Western text
         if re.search(r"[^\x00-\x7f]{4}", text) or not all(c.isprintable() or c in "\t\r\n\xa0" for c in text):
-            found = f"got byte {content[error.start]:#x} at {error.start}"
+            found = f"got byte {content[error.start]:#x} at position {error.start}"
             raise DataError(f"{source}: expected text in UTF-8, {found} (save it as 'CSV UTF-8')") from None
         return text
 
@@ -494,7 +494,7 @@ def _from_groups(grid: _Grid, sheet: Sheet, labels: int | None, groups: IntArray
         texts = [" ".join(dict.fromkeys(above[k * share : (k + 1) * share])) for k in range(len(groups))]
         known = [found for text in texts if (found := re.search(_TEMPERATURE, text))]
         if not len(known) * share == len(above) > 0 or len({each[2] for each in known}) > 1:
-            what = f"expected a temperature above each of the {len(groups)} groups of columns, such as '20 degC'"
+            what = f"expected {len(groups)} temperatures such as '20 degC', one in the heading of each group of columns"
             raise DataError(sheet.head.message(sheet.source, what))
         names, units = [*names, "temperature"], [*units, in_degrees(known[0][2])]
         extra = [[each[1].replace(",", ".")] for each in known]
@@ -576,15 +576,16 @@ def read_table(
     read, problems = _converted(sheet, meanings, allow_missing)
     problems = [*_misspelt(sheet, meanings, absent), *problems]
     unknown = [name for name, (column, _, _) in zip(sheet.names, meanings, strict=False) if column is None]
-    lacking = [f"a column {column.name}" for column in absent if column.needed]
-    lacking += [", or ".join(" and ".join(each) for each in ways)] if way is None and ways else []
+    lacking = [f"a column {column.name!r}" for column in absent if column.needed]
+    columns_of = [" and ".join(f"a column {name!r}" for name in each) for each in ways]
+    lacking += ["either " + ", or ".join(columns_of)] if way is None and ways else []
     if lacking and not problems:
         got = f", got {listed(unknown)}" if unknown else ""
         problems = [sheet.head.message(source, f"expected {' and '.join(lacking)}{got}")]
     if problems:
         raise DataError("\n".join(problems))
     by_unit = [
-        f"{name!r} is taken as {column.name}, because of its unit"
+        f"{name!r} is taken as {column.name!r}, because of its unit"
         for name, (column, unit, is_logarithm) in zip(sheet.names, meanings, strict=False)
         if column and not is_logarithm and match(name, unit, columns)[0] is not column
     ]
@@ -620,7 +621,7 @@ def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -
             read[column.name], taken[column.name] = values, place
         elif not wrong and not np.allclose(values, read[column.name], rtol=AGREE, atol=0, equal_nan=True):
             both = f"{sheet.names[taken[column.name]]!r} and {sheet.names[place]!r}"
-            what = f"column {column.name} is given twice: {both} disagree: delete one of the two"
+            what = f"column {column.name!r} is given twice: {both} disagree: delete one of the two"
             problems.append(sheet.head.message(sheet.source, what))
     read.lines = sheet.lines
     read.headings = {name: sheet.names[place] if sheet.names else "" for name, place in taken.items()}
@@ -651,7 +652,7 @@ def _unit(written: str, column: Column) -> str:
     stated = factors(unit, column.unit)
     if column.given_unit and not np.allclose(stated, factors(column.given_unit, column.unit), atol=0):
         raise ValueError(
-            f"the file states {written}, got the unit {column.given_unit!r}: give a unit only if the file states none"
+            f"the file states {written!r}, got the unit {column.given_unit!r}: give a unit only if the file states none"
         )
     return unit
 

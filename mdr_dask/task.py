@@ -168,7 +168,7 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
         return replace(result, values=unknown)
     for name, empty in unknown.items():
         if name not in result.values:
-            raise ValueError(f"the output {name} is missing")
+            raise ValueError(f"the output {name!r} is missing")
         values[name] = real_numbers(name, result.values[name])
         if values[name].shape != empty.shape:
             expected, got = empty.shape[2:], values[name].shape[2:]

@@ -196,7 +196,7 @@ def test_check_and_dry_run_state_the_range_of_results(study, tmp_path, monkeypat
 
 WRONG = {
     "three axes": ("shift: {adaptive: [0, 1], until: 1 %}, noise: {adaptive: [0, 1], until: 1 %}", AXIS, "", "most 2"),
-    "zip": ("shift: 1", AXIS, "sampling: zip", "expected sampling: grid with an adaptive axis"),
+    "zip": ("shift: 1", AXIS, "sampling: zip", "expected 'sampling: grid', because this axis is adaptive"),
     "no tolerance": ("shift: 1", "{adaptive: [1 m, 2 m]}", "", r"x\.until: .*missing|until"),
     "few": ("shift: 1", "{adaptive: [1 m, 2 m], until: 1 %, at_most: 4}", "", r"at_most: .* at least 5, got 4"),
     "same ends": ("shift: 1", "{adaptive: [1 m, 1 m], until: 1 %}", "", "expected two different ends"),

@@ -40,7 +40,7 @@ def test_dry_run_prints_the_range_of_rounds(campaign, capsys):
     printed = capsys.readouterr().out
     assert "8 cases x 8 to 24 realisations = 64 to 192 results" in printed
     assert not Path("results").exists()
-    assert "from the first round to the last one" in printed
+    assert "the first number is for the first round" in printed
     assert main(["run", str(campaign), "--dry-run", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["realisations"], document["at_most"], document["results"]) == (8, 24, 64)

@@ -44,7 +44,11 @@ def test_errors_false_leaves_them_and_their_work_out(toy):
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("[height, width]", "[width_error]", "outputs.0.: expected the output 'width', whose error is stored unless"),
+        (
+            "[height, width]",
+            "[width_error]",
+            "outputs.0.: expected the output 'width' .its error is stored too, except",
+        ),
         ("[height, width]", "[width]\nerrors: maybe", "errors: expected true or false, got 'maybe'"),
         ("6", "{at_most: 20, until: {width_error: 1 %}}", "this is none of the outputs of the campaign"),
     ],

@@ -113,7 +113,7 @@ def test_files_and_folders_that_are_no_store_are_left_alone(toy, tmp_path):
     (tmp_path / "folder/notes.txt").write_text("mine")
     with pytest.raises(StoreError, match="a file, expected the folder of a store"):
         run(campaign, str(tmp_path / "file"))
-    with pytest.raises(StoreError, match=r"holds something else \(notes\.txt\)"):
+    with pytest.raises(StoreError, match=r"a folder with other files \(notes\.txt\)"):
         run(campaign, str(tmp_path / "folder"))
     assert [path.name for path in (tmp_path / "folder").iterdir()] == ["notes.txt"]
 

@@ -66,7 +66,7 @@ def test_control_characters_of_messages_are_escaped(filled, capsys):
 
 def test_a_store_in_memory_is_refused(filled, capsys):
     assert main(["run", "a.yaml", "--store", "memory://a"]) == 2
-    assert "expected a store that outlasts this command" in capsys.readouterr().err
+    assert "expected a store on a disk or server, not in memory" in capsys.readouterr().err
 
 
 def test_a_link_to_itself_is_one_message(filled, capsys):

@@ -104,8 +104,8 @@ def test_parameters_that_set_coordinates_cannot_vary():
     text = WEAR.replace("history: LISTS", "extent: [1.2, 1.6]")
     assert len(loads(text, "", ".").series[0].axes) == 1
     message = (
-        "parameters.extent: expected one value, because this parameter sets the values of radius, along which "
-        r"worn_profile is stored \(write a series for each value\)"
+        "parameters.extent: expected one value, because the values of the axis 'radius' of the output "
+        r"'worn_profile' depend on this parameter \(write a series for each value\)"
     )
     with pytest.raises(CampaignError, match=message):
         loads(text.replace("wear_volume", "worn_profile"), "", ".")

@@ -118,7 +118,9 @@ def test_a_server_that_only_looks_before_it_writes_is_named(toy, bucket, monkeyp
 
     monkeypatch.setattr(MemoryFileSystem, "pipe_file", AbstractFileSystem.pipe_file)
     assert run(small(toy), bucket).done == 12
-    assert "nothing prevents two simultaneous runs here (no conditional write): start one run at a time" in caplog.text
+    assert (
+        "two simultaneous runs cannot be prevented here (no conditional writes): start one run at a time" in caplog.text
+    )
 
 
 def late_task(toy, url, monkeypatch):

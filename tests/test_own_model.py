@@ -244,7 +244,7 @@ DONE = np.full((1, 1), Status.DONE)
 RESULTS = {
     "no Result": (lambda result: result.values, "TypeError: expected a Result, got dict"),
     "unknown state": (changed(status=DONE * 7), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
-    "output missing": (lambda result: replace(result, values={}), "ValueError: the output wear_volume is missing"),
+    "output missing": (lambda result: replace(result, values={}), "ValueError: the output 'wear_volume' is missing"),
     "shape": (changed(values={"wear_volume": np.ones(3)}), "ValueError: wear_volume: expected a number for each case"),
     "place of a message": (changed(messages={(5, 5): "far"}), r"ValueError: messages: expected keys"),
 }

@@ -91,7 +91,7 @@ def test_a_part_that_needs_results_of_missing_parts_ends_with_a_message(toy, url
     assert 0 < progress.done < 20
     assert events[-1].sentence == (
         "the round of 5 realisations needs results of parts that are not running: 1/3, 3/3; "
-        "start them, then this one again"
+        "start these, then this part again"
     )
 
 

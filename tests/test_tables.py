@@ -79,10 +79,10 @@ WRONG = {
         "f [Hz],E' [Pa],tan delda\n1,2,3\n",
         "1: unknown column 'tan delda' (did you mean 'tan delta'?)",
     ),
-    "missing column": ("f [Hz],torque [N]\n1,5\n", "1: expected a column storage modulus, got torque"),
+    "missing column": ("f [Hz],torque [N]\n1,5\n", "1: expected a column 'storage modulus', got torque"),
     "twice": (
         "f [Hz],omega [Hz],E' [Pa]\n1,2,3\n",
-        "1: column frequency is given twice: 'f' and 'omega' disagree: delete one of the two",
+        "1: column 'frequency' is given twice: 'f' and 'omega' disagree: delete one of the two",
     ),
     "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3: expected 2 values as in line 1, got 1"),
     "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3: $expected a number, got 'high'"),
@@ -141,7 +141,7 @@ def test_a_given_unit_serves_a_table_without_one():
     assert read_table("x\n5\n", "a.csv", [column])["x"] == 0.005
     assert read_table("5\n6\n", "a.csv", [column])["x"][1] == 0.006
     assert read_table("x [mm]\n5\n", "a.csv", [column])["x"] == 0.005
-    with pytest.raises(DataError, match="the file states um, got the unit 'mm'"):
+    with pytest.raises(DataError, match="the file states 'um', got the unit 'mm'"):
         read_table("x [um]\n5\n", "a.csv", [column])
 
 

@@ -129,6 +129,6 @@ def test_a_run_ends_with_one_message_when_the_scheduler_is_stopped(folder, start
     head.send_signal(signal.SIGSTOP)
     lines = driver.stderr.read().splitlines()
     assert driver.wait() == 2
-    last = rf"no answer of the scheduler for \d+ s; {KEPT}, if necessary with a larger --patience$"
+    last = rf"no answer from the scheduler for \d+ s; {KEPT}, if necessary with a larger --patience$"
     assert re.search(last, " ".join(" ".join(lines).split()))
     assert not any(word in line for line in lines for word in ("Traceback", "asyncio", "Error"))

@@ -27,6 +27,6 @@ def load_cluster(path: FilePath) -> dict[str, Any]:
         elif not (isinstance(value, dict) if key != "class" else isinstance(value, str) and "." in value):
             document.report((key,), f"expected {_EXPECTED[key]}, got {shown(value)}")
     if "class" not in data and not document.problems:
-        document.report((), f"expected a mapping with the key class, got {shown(document.data)}")
+        document.report((), f"expected a mapping with the key 'class', got {shown(document.data)}")
     document.problems.raise_if_any()
     return data

@@ -173,7 +173,7 @@ class _Reader:
         if kind == "bool":
             return text.casefold() == "true"
         if _NO_TEXT.search(text):
-            self.document.report(path, "expected text without null or damaged characters")
+            self.document.report(path, "expected text without null characters or half characters (surrogates)")
             return None
         digits = text.replace("_", "").casefold()
         if kind == "int":

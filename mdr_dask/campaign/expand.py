@@ -96,8 +96,8 @@ class _Expansion:
             for dim in first.keys() & set(output.dims):
                 if any(not np.array_equal(first[dim].values, other[dim].values) for other in others):
                     what = (
-                        f"expected one value, because this parameter sets the values of {dim}, along which "
-                        f"{output.name} is stored"
+                        f"expected one value, because the values of the axis {dim!r} of the output {output.name!r} "
+                        "depend on this parameter"
                     )
                     self._complain(origin, f"{what} (write a series for each value)")
                     return
@@ -129,7 +129,7 @@ class _Expansion:
         adaptive = [one for one in found if one.written]
         for one in adaptive:
             if self.spec.sampling != "grid":
-                self._complain(one.origin, "expected sampling: grid with an adaptive axis")
+                self._complain(one.origin, "expected 'sampling: grid', because this axis is adaptive")
         for one in adaptive[MOST_ADAPTIVE:]:
             self._complain(one.origin, f"expected at most {MOST_ADAPTIVE} adaptive axes, got {len(adaptive)}")
 
@@ -138,12 +138,12 @@ class _Expansion:
         for one in sized[1:]:
             if len(one.items) != len(sized[0].items):
                 what = (
-                    f"expected {len(sized[0].items)} values, as many as {'.'.join(sized[0].path)} has, got "
+                    f"expected {len(sized[0].items)} values, as many as {'.'.join(sized[0].path)!r} has, got "
                     f"{len(one.items)}"
                 )
                 self._complain(
                     one.origin,
-                    f"{what} (sampling: grid combines all values of one parameter with all values of the others)",
+                    f"{what} ('sampling: grid' combines all values of one parameter with all values of the others)",
                 )
 
     def _grid_values(

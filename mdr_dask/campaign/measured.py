@@ -179,8 +179,8 @@ def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapp
             before, factor, zero = factors(unit, units[axis])
             values = before * (numbers[np.isfinite(numbers)] * factor + zero)
             if values.size and low <= values.min() and values.max() <= high:
-                what = f"column {heading!r} is not used, but may be {axis}, which is an unknown if it has no column"
-                wrong.append(f"{source}: {what}: name the column {axis}, or delete it")
+                what = f"column {heading!r} is not used, but its numbers lie in the range of the unknown {axis!r}"
+                wrong.append(f"{source}: {what}: rename the column to {axis!r}, or delete the column")
     if wrong:
         raise DataError("\n".join(wrong))
 

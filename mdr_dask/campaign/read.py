@@ -42,7 +42,7 @@ def _campaign(document: Document, directory: str) -> Campaign:
     if not isinstance(document.data, dict):
         if not document.problems:
             document.report(
-                (), f"expected a mapping with the keys name, model and parameters, got {shown(document.data)}"
+                (), f"expected a mapping with the keys 'name', 'model' and 'parameters', got {shown(document.data)}"
             )
         document.problems.raise_if_any()
     spec, wrong = _spec(document, directory)
@@ -120,7 +120,7 @@ def _outputs(document: Document, spec: CampaignSpec, model: Model[Any]) -> tuple
     for index, name in enumerate(spec.outputs or ()):
         path = ("outputs", index)
         if name in errors:
-            what = f"expected the output {errors[name]!r}, whose error is stored unless errors: false"
+            what = f"expected the output {errors[name]!r} (its error is stored too, except with 'errors: false')"
             document.report(path, f"{what}, got {name!r}")
         elif name in model.parameters.renamed:
             document.report(path, f"{name} has been renamed or removed: {model.parameters.renamed[name]}")
@@ -137,7 +137,7 @@ def _replication(document: Document, spec: CampaignSpec, model: Model[Any], outp
     if not isinstance(wanted, AdaptiveSpec):
         return Replication(wanted, wanted, {})
     if wanted.at_least > wanted.at_most:
-        what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
+        what = f"expected a whole number of at least {wanted.at_least}, the value of 'at_least', got {wanted.at_most}"
         document.report(("realisations", "at_most"), what)
     until = tolerances(document, ("realisations", "until"), wanted.until, model, outputs)
     return Replication(wanted.at_least, wanted.at_most, until)

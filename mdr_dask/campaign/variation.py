@@ -130,7 +130,7 @@ class _Search:
         origin, at = self._origin(name, name), (*name, "adaptive")
         try:
             if self.drawn:
-                self._complain(name, "expected sampling: grid with an adaptive axis", name)
+                self._complain(name, "expected 'sampling: grid', because this axis is adaptive", name)
             if not isinstance(ends, list) or len(ends) != 2:
                 self._complain(at, f"expected [first, last], got {shown(ends)}", name)
             linear = self._spread(path, "linear", [*ends, FIRST], at)
@@ -160,7 +160,10 @@ class _Search:
 
     def _range(self, path: tuple[str, ...], value: dict[str, Any], name: Path) -> Spread | list[Item]:
         if len(value) != 1:
-            self._complain(name, f"expected one of the keys linear, geometric and values, got {', '.join(value)}", name)
+            got = ", ".join(map(repr, value)) or "none"
+            self._complain(
+                name, f"expected exactly one of the keys 'linear', 'geometric' and 'values', got {got}", name
+            )
         [(kind, content)] = value.items()
         at = (*name, kind)
         if kind == "values":
@@ -192,7 +195,8 @@ class _Search:
             )
         numbers = spaced(spread, count)
         if len(numbers) < (2 if spread.whole else count):
-            self._complain(at, f"expected ends between which {count} different values exist", name)
+            got = f"{shown(content[0])} and {shown(content[1])}"
+            self._complain(at, f"expected ends that are far enough apart for {count} different values, got {got}", name)
         first, last = (numbers[0], numbers[-1]) if spread.whole else content[:2]
         origin = self._origin(at, name)
         inner = [Item(number, origin, inner=True) for number in numbers[1:-1]]

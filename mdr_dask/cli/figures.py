@@ -202,7 +202,7 @@ def _requested(
     of_outputs = [name for name in names if given or name not in known]
     outputs = _outputs_of(groups)
     if given and (fixed := [name for name in names if name in known and name not in outputs]):
-        raise click.UsageError(f"--{given[0]} needs an output; the axes of the figure {fixed[0]} are fixed")
+        raise click.UsageError(f"--{given[0]} needs an output; the axes of the figure {fixed[0]!r} are fixed")
     require_known(
         of_outputs, outputs if given else [*known, *outputs], "output" if given else "store, figure or output"
     )

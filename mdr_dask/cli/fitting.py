@@ -192,5 +192,5 @@ def _sentences(attributes: dict[str, object]) -> list[str]:
             f"{attributes['left_out']} of {attributes['cases']} cases are left out, because they have no value"
         )
     if attributes["realisations"] == 1:
-        sentences.append("with one realisation, scatter between realisations counts as an interaction")
+        sentences.append("with one realisation, the scatter of samples counts as an interaction of parameters")
     return [*sentences, str(attributes["advice"])]

@@ -66,7 +66,7 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     study = load(campaign)
     url = options["url"] or study.store
     if url.startswith("memory:"):
-        raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
+        raise click.UsageError(f"expected a store on a disk or server, not in memory, got {url!r}")
     ask(study)
     if dry_run:
         _print_plan(study, url, form)
@@ -183,4 +183,4 @@ def _print_failed(url: str, progress: Progress) -> None:
 def _shared(progress: Progress) -> str:
     """Return a text with the fraction of results that needed no solution of their own, or an empty text."""
     share = 1 - progress.solves / max(progress.done, 1)
-    return f" ({share:.1%} of the results needed no solve of their own)" if progress.solves and share > 0 else ""
+    return f" ({share:.1%} of the results reused the solve of another result)" if progress.solves and share > 0 else ""

@@ -33,7 +33,9 @@ KINDS = ("map", "scan", "spectrum")
     help="Window function of the heights; use none only for a periodic surface.  [hann]",
 )
 @click.option(
-    "--outliers", type=click.Choice(("keep", "fill")), help="Keep or replace points far from their neighbours.  [keep]"
+    "--outliers",
+    type=click.Choice(("keep", "fill")),
+    help="Keep or replace heights far from the heights of the neighbouring points.  [keep]",
 )
 @click.option("--direction", type=click.Choice(("x", "y")), help="Sliding direction on an anisotropic surface.")
 @click.option("--longest-wavelength", help="Leave out longer wavelengths.")

@@ -210,7 +210,9 @@ class _Run:
             if not late:
                 return True
             if late - here:
-                sentence = f"{what} that are not running: {_named(late - here, part)}; start them, then this one again"
+                sentence = (
+                    f"{what} that are not running: {_named(late - here, part)}; start these, then this part again"
+                )
                 self.tell(Event("round unfinished", {"parts": sorted(late - here)}, sentence))
                 return False
             if time.monotonic() - reported > PAUSE:

@@ -69,7 +69,9 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
     """Return a sentence that says why interpolation along an adaptive axis misses the tolerance in some cases."""
     axis, values = mesh.series.axes[number], mesh.used(number).sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
-    why = f"at_most is {most} values" if (values >= most).any() else "the output jumps or bends in a 1000th of the axis"
+    why = (
+        f"at_most is {most} values" if (values >= most).any() else "the output jumps or bends within 1/1000 of the axis"
+    )
     where = f"{series}: " if series else ""
     return f"{where}interpolation along {axis.name} misses its tolerance in {count} of {others} cases: {why}"
 

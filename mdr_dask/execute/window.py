@@ -115,7 +115,7 @@ class TaskWindow:
             found = self._client.sync(self._client.scheduler.ncores, callback_timeout=PAUSE)
             self._threads, what = sum(found.values()), "no worker"
         except TimeoutError:
-            self._threads, what = 0, "no answer of the scheduler"
+            self._threads, what = 0, "no answer from the scheduler"
         now = self._checked_at = time.monotonic()
         if self._threads:
             self._had_worker_at = self._reported_at = now
@@ -152,7 +152,7 @@ def _outcomes(future: Future) -> Outcomes | None:
     except CancelledError:
         raise ClusterError(f"the scheduler went away; {KEPT}") from None
     except ModuleNotFoundError as error:
-        raise ClusterError(f"a worker lacks {error.name!r}; {KEPT}") from None
+        raise ClusterError(f"a worker lacks the Python module {error.name!r}; {KEPT}") from None
     except (AttributeError, TypeError) as error:
         raise ClusterError(f"a worker has another version of mdr_dask: {error}; install the same on both") from None
     return outcomes

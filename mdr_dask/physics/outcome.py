@@ -33,7 +33,7 @@ _SENTENCES = {
     Outcome.CONVERGED: "converged",
     Outcome.DEPTH_NOT_FOUND: "the depth at which the contact carries the load was not found",
     Outcome.OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
-    Outcome.INVALID: "load, velocity and line must be finite, the load and the Deborah number positive",
+    Outcome.INVALID: "load, velocity and line must be finite; the load and the Deborah number must also be positive",
     Outcome.TOO_MANY_STEPS: "too many steps were needed",
     Outcome.SINGULAR: "the linear equations of a step have no solution",
     Outcome.FILM_COLLAPSED: "the next step would have closed the film",

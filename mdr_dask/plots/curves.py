@@ -123,7 +123,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
     curve begins with the name `series`. The first curve gets the colour with the index `first`.
     """
     if along not in data.coords and along not in data.dims:
-        raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
+        raise DataError(f"expected a series with the axis {along!r}, got {', '.join(map(str, data.dims))}")
     over = along_dim(data, along, output)
     others = [dim for dim in axes_of(data, output) if dim != over and data.sizes[dim] > 1]
     if by:

@@ -7,7 +7,7 @@ from mdr_dask.plots.view import View, draw
 
 #: Limits of the film ratio: below 0.5, a computed breakthrough is an artefact; 1 and 3 separate lubrication regimes.
 FILM_RATIOS = {
-    0.5: "film ratio 0.5: below it breakthrough is an artefact",
+    0.5: "film ratio 0.5: breakthroughs below it are artefacts",
     1.0: "film ratio 1: boundary below, mixed above",
     3.0: "film ratio 3: full film above",
 }

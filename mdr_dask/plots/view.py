@@ -150,7 +150,7 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
     known = sorted({str(name) for data in groups.values() for name in data.data_vars if name != "status"})
     if output not in known:
         hint = did_you_mean(output, known)
-        return {}, [f"{output}, which is not an output of this study{hint if 'mean' in hint else ''}"]
+        return {}, [f"this study has no output {output!r}{hint if 'mean' in hint else ''}"]
     found: dict[str, xr.Dataset] = {}
     reasons: dict[str, list[str]] = {}
     for name, data in groups.items():

@@ -108,7 +108,7 @@ class Columns:
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
-            return DataError(f"{name} is {self._numbers[name].formula}: the study lacks {missing}")
+            return DataError(f"{name} = {self._numbers[name].formula}: the study lacks {missing}")
         if not name.isidentifier():
             return DataError(f"expected the name of a column, got {name!r}; formulas are for --where and --sort")
         hint = did_you_mean(name, self.known) or f"; known: {', '.join(self.known)}"

@@ -178,7 +178,7 @@ class _Evaluation:
         got = ast.unparse(node)
         for name in self.quantities:
             got = got.replace(name, "a quantity")
-        allowed = f"+ - * / **, comparisons, and, or, not, in, and {', '.join(FUNCTIONS)}"
+        allowed = f"only + - * / **, comparisons, 'and', 'or', 'not', 'in', and the functions {', '.join(FUNCTIONS)}"
         return DataError(f"{self.text!r}: expected {allowed}, got {got!r}")
 
     def _named(self, name: str) -> Value:
@@ -225,8 +225,8 @@ class _Evaluation:
             first, second = (side or Value(name) for side, name in zip(sides, names, strict=True))
             if not (first.kind in "OUT" and second.kind in "OUT"):
                 raise DataError(
-                    f"{self.text!r}: expected a comparison of words with words or of numbers with numbers, "
-                    "got both kinds"
+                    f"{self.text!r}: expected a comparison of two words or a comparison of two numbers, "
+                    "got a word and a number"
                 )
             same = first.array == second.array
             return same.any(ALTERNATIVES) if ALTERNATIVES in getattr(same, "dims", ()) else same

@@ -42,7 +42,7 @@ def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
         found = [str(each) for each in dataset.variables if each in own]
         if not found:
             raise DataError(
-                f"expected a unit for a column of the table, got {name!r}{did_you_mean(name, _known(dataset))}"
+                f"expected the name of a column, got {name!r} with unit {unit!r}{did_you_mean(name, _known(dataset))}"
             )
         dataset = dataset.assign({each: _converted(dataset[each], unit, name) for each in found})
     return dataset

@@ -66,7 +66,7 @@ def _campaign(url: str, text: str) -> tuple[bytes, dict[str, bytes]]:
             text = text.replace(str(file["name"]), name.name)
             name = PurePosixPath(name.name)
         if str(name) in found:
-            raise StoreError(f"{file['name']}: another file of the campaign is called {name} in the zip: rename a file")
+            raise StoreError(f"{file['name']}: two files of the campaign are called {name} in the zip: rename one")
         found[str(name)] = _read(file)
     return text.encode(), found
 

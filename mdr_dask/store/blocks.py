@@ -111,7 +111,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Return the arrays of a group. The arrays are cached until the layout changes."""
     found, here = layout_mark(url), platform.node()
     if found != layout:
-        what = f"{here} finds another store or layout at this path" if found else f"not seen from {here}"
+        what = f"{here} finds another store or another layout" if found else f"not seen from {here}"
         raise StoreError(f"{url}: {what}; the workers need a shared file system or a URL")
     return _opened(url, series, bytes_of(url))
 

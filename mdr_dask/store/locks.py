@@ -419,7 +419,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
             raise _busy(url, _holder(url, name))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
         log.warning(
-            "%s: nothing prevents two simultaneous runs here (no conditional write): start one run at a time", url
+            "%s: two simultaneous runs cannot be prevented here (no conditional writes): start one run at a time", url
         )
     remove(url, [old for n in standing for old in (_claim(name, n), _claim(name, n, "life"))])
     return number

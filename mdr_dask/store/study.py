@@ -90,12 +90,12 @@ def refuse_file(url: str, expected: str = "the folder of a store") -> None:
 
 def exists(url: str) -> bool:
     """Return whether there is a study at a path or URL; raise StoreError for a file or a folder with other files."""
-    refuse_file(url, "the folder of a store or nothing")
+    refuse_file(url, "the folder of a store, or a path that does not exist")
     path, found = local(url), _root_attributes(url)
     if found is None and path is not None and path.is_dir():
         others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial" and entry.name not in KEPT)
         if others:
-            raise StoreError(f"{url}: a folder that holds something else ({others[0]}), expected a store or nothing")
+            raise StoreError(f"{url}: a folder with other files ({others[0]}), expected a store or an empty folder")
     return found is not None and not only_claimed(found)
 
 

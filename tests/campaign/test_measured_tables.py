@@ -63,7 +63,7 @@ def test_columns_that_may_be_an_axis_are_not_left_out(heading):
     text = f"velocity [m/s];mu;{heading};F_t [N];room [degC];n\n1;0,3;2;700;20;30\n2;0,4;5;800;21;30\n"
     axes = {"velocity": (1, 2), "normal_force": (1e-3, 6)}
     with pytest.raises(
-        DataError, match="is not used, but may be normal_force, which is an unknown if it has no column: name"
+        DataError, match="is not used, but its numbers lie in the range of the unknown 'normal_force': rename"
     ):
         read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, axes)
     assert read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2)}).remark.startswith("not used")
@@ -126,7 +126,7 @@ def test_synonyms_of_a_short_name_are_read(heading):
 
 
 def test_names_of_several_quantities_are_refused():
-    with pytest.raises(DataError, match="'Speed', which may be velocity or mean_velocity"):
+    with pytest.raises(DataError, match="'Speed', which may mean 'velocity' or 'mean_velocity'"):
         read_measured("Speed [m/s];mu\n1;2\n", "rig.csv", {"velocity": "m/s", "mean_velocity": "m/s"}, FRICTION)
 
 

@@ -26,5 +26,5 @@ def test_a_file_in_another_encoding_is_refused_with_the_byte(tmp_path):
     path.write_bytes(b"x,z [\xb5m]\n")
     assert DataFile.of(path).read_text() == "x,z [µm]\n"
     path.write_bytes("x,z [um],\u9ad8\u3055\n".encode("shift_jis"))
-    with pytest.raises(DataError, match=r"expected text in UTF-8, got byte 0x8d at 9"):
+    with pytest.raises(DataError, match=r"expected text in UTF-8, got byte 0x8d at position 9"):
         DataFile.of(path).read_text()

@@ -176,7 +176,7 @@ def test_a_scan_is_read_as_it_stands_and_codes_are_no_heights(layout, code, tmp_
     ("layout", "units", "message"),
     [
         ("x, z", Units("um"), "unit of its positions: give `x_unit`"),
-        ("names", Units("nm"), "the file states um, got the unit 'nm'"),
+        ("names", Units("nm"), "the file states 'um', got the unit 'nm'"),
     ],
 )
 def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):

@@ -283,7 +283,7 @@ def test_a_wrong_question_is_one_sentence_before_any_row(study, parts, told):
 
 def test_a_number_without_its_ingredients_names_them(study):
     for part in ({"columns": ("load_number",)}, {"where": "load_number > 1"}):
-        with pytest.raises(DataError, match=r"load_number is .*: the study lacks shear_modulus"):
+        with pytest.raises(DataError, match=r"load_number = .*: the study lacks shear_modulus"):
             table(study.drop_vars("shear_modulus"), Question(**part), 0, silent)
 
 

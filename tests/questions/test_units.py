@@ -38,7 +38,7 @@ REFUSED = [
     ("velocity", "expected NAME=UNIT,NAME=UNIT, got 'velocity'"),
     ("velocity=N", "velocity: expected a velocity (such as '1 mm/s'), got 'N'"),
     ("velocity=kmh", "velocity: unknown unit 'kmh'"),
-    ("het=K", "expected a unit for a column of the table, got 'het' (did you mean 'heat'?)"),
+    ("het=K", "expected the name of a column, got 'het' with unit 'K' (did you mean 'heat'?)"),
 ]
 
 

@@ -156,4 +156,4 @@ def test_two_files_of_one_name_are_refused(tmp_path, capsys):
     place = str(tmp_path / "road.zarr")
     assert main(["run", str(tmp_path / "work/road.yaml"), "--store", place, "--quiet"]) == 0
     assert main(["publish", place, "-o", str(tmp_path / "road.zip")]) == 2
-    assert "another file of the campaign is called road.csv in the zip" in capsys.readouterr().err
+    assert "two files of the campaign are called road.csv in the zip" in capsys.readouterr().err

@@ -115,7 +115,7 @@ def line_contact(
         pole = ROELANDS_PRESSURE / p0
         exponent = G / (2 * E_star) * ROELANDS_PRESSURE / float(np.log(viscosity) + ROELANDS_LOGARITHM)
     elif viscosity_law not in ("barus", "roelands"):
-        raise ValueError(f"expected the viscosity law barus or roelands, got {viscosity_law!r}")
+        raise ValueError(f"expected the viscosity law 'barus' or 'roelands', got {viscosity_law!r}")
     rise, saturation = (DENSITY_RISE * p0, DENSITY_SATURATION * p0) if compressible else (0.0, 0.0)
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 

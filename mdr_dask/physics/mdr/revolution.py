@@ -129,7 +129,8 @@ def check_table(radius: FloatArray, height: FloatArray) -> None:
     if not (np.all(np.isfinite(radius)) and np.all(np.isfinite(height))):
         bad = int(np.argmin(np.isfinite(radius) & np.isfinite(height)))
         raise ValueError(
-            f"a profile must be finite, got {float(radius[bad])!r}, {float(height[bad])!r} in row {bad + 1}"
+            f"a profile must be finite, got radius {float(radius[bad])!r} "
+            f"and height {float(height[bad])!r} in row {bad + 1}"
         )
     if radius[0] != 0.0:
         raise ValueError(f"the radii of a profile must start at 0, got {float(radius[0])!r}")

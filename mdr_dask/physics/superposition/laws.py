@@ -53,7 +53,7 @@ def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, a
 def fit_arrhenius(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int) -> ShiftLaw:
     """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_anchor)`` to temperatures in K; arguments as in `fit_power`."""
     if np.any(temperature <= 0):
-        raise FitError("the law of Arrhenius needs absolute temperatures")
+        raise FitError(f"the law of Arrhenius needs temperatures above 0 K, got {temperature.min():.9g} K")
 
     def distance(at: FloatArray) -> FloatArray:
         return np.asarray((1 / at - 1 / temperature[anchor]) / (GAS_CONSTANT * np.log(10)))

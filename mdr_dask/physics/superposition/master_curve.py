@@ -191,7 +191,9 @@ def _sorted(
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
     values = np.asarray(groups, dtype=np.float64).reshape(-1)
     if values.size != len(curves) or values.size < 2 or np.unique(values).size != values.size:
-        raise DataError(f"expected one distinct group for each of two or more curves, got {values.tolist()!r}")
+        raise DataError(
+            f"expected two or more curves with different groups, got {len(curves)} curves, groups {values.tolist()!r}"
+        )
     arrays = []
     for place in np.argsort(values):
         x, y = np.asarray(curves[place][0], dtype=np.float64), np.atleast_2d(np.asarray(curves[place][1], np.float64))

@@ -50,7 +50,9 @@ def march(
     while history[-1].time < end and not stops(history[-1]):
         time = history[-1].time
         if time + step == time:
-            raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at N or s = {time:.6g}")
+            raise NotConvergedError(
+                f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law, at N or s (cycles or path) = {time:.6g}"
+            )
         moment, error = _try_step(problem, newton, history, time + step)
         change = 0.8 * (tolerance / max(error, 1e-300)) ** (1.0 / (min(len(history), 3) + 1))
         if moment is not None and error <= tolerance:
@@ -83,7 +85,7 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
             continue
         next_time = 0.5 * (past[-1].time + next_time)
         if next_time == past[-1].time:
-            raise NotConvergedError(f"the wear law has no solution at N or s = {time:.6g}")
+            raise NotConvergedError(f"the wear law has no solution at N or s (cycles or path) = {time:.6g}")
     return past[-1]
 
 

@@ -163,7 +163,7 @@ def test_impossible_case_has_a_reason() -> None:
         ({"groups": (2e-5, 1e-11, np.inf)}, "expected a positive G, got inf"),
         ({"inlet": 1.0}, "expected a negative inlet position"),
         ({"viscosity_law": "roelands"}, r"needs a viscosity above 6\.3e-5 Pa s, got None"),
-        ({"viscosity_law": "ree"}, "expected the viscosity law barus or roelands, got 'ree'"),
+        ({"viscosity_law": "ree"}, "expected the viscosity law 'barus' or 'roelands', got 'ree'"),
     ],
 )
 def test_bad_input(change: dict[str, object], message: str) -> None:

@@ -102,8 +102,8 @@ def pieces_of_a_line(*places):
 @pytest.mark.parametrize(
     ("groups", "curves", "message"),
     [
-        ([1.0], [([0, 1], [0, 1])], "one distinct group for each of two or more curves"),
-        ([1.0, 1.0], [([0, 1], [0, 1])] * 2, "one distinct group"),
+        ([1.0], [([0, 1], [0, 1])], "two or more curves with different groups, got 1 curves"),
+        ([1.0, 1.0], [([0, 1], [0, 1])] * 2, "with different groups, got 2 curves"),
         ([1.0, 2.0], [([0, 1], [0, 1]), ([0], [1])], "the curve at 2 needs two or more distinct points"),
         ([1.0, 2.0], [([0, 1], [0, 1]), ([0, 1], [1, np.nan])], "the curve at 2 needs"),
         ([1.0, 2.0], [([0, 1, 2], [3, 3, 3]), ([0, 1, 2], [4, 4, 4])], "expected curves that vary"),
