@@ -179,8 +179,8 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
     unknowns = len(predicted.unknowns)
     if count <= unknowns:
         raise FitError(
-            f"expected more than {unknowns} measured points for {unknowns} unknowns, because the table has no errors "
-            f"of measurement, got {count}; add points, or a column standard_error"
+            f"expected more than {unknowns} measured points for {unknowns} unknowns, got {count}, and the table has no "
+            "measurement errors; add points, or a column standard_error"
         )
     shares = bool(np.all(values > 0))
     least = np.full(2, np.inf)
@@ -312,7 +312,7 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 def sentence(found: Calibration) -> str:
     """Return a sentence on which unknowns the data determine, and on whether the model explains the data."""
     start = (
-        "the model does not explain the measured points; with measurement errors that would explain the residuals, "
+        "the model does not explain the measured points; with errors large enough to explain the residuals, "
         if found.law_holds.startswith("no:")
         else ""
     )

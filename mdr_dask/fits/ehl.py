@@ -71,7 +71,7 @@ def _films(data: xr.Dataset) -> Variables:
                 about = f"exponent of {_GROUPS[name]} in h/R" if k else "factor of the power law for h/R"
                 found |= measure(f"{film}_{name}{end}", float(value[k] if k else np.exp(value[k])), about)
         found |= measure(f"{film}_rms", rms(residuals), "rms relative deviation from the fitted formula")
-        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative deviation from the formula")
+        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative deviation from the fit")
         departures.append(residuals)
         of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
     sentences = (law_holds(np.concatenate(each), None) for each in (of_stated, departures))

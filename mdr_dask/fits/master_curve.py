@@ -85,8 +85,8 @@ def _sentence(kind: Vertical, largest: str = "") -> str:
     b_t = "b_T = rho0 T0 / (rho T)" if kind == "modulus" else "1 / b_T = rho T / (rho0 T0)"
     offset = 100 * np.log(10) * OFFSET[0]
     return (
-        f"a {kind}: {b_t} with an expansion of {EXPANSION:g} 1/K is removed, and each temperature has an unknown "
-        f"offset of about {offset:.2g} % (--vertical none turns both off){largest}"
+        f"a {kind}: {b_t} with an expansion of {EXPANSION:g} 1/K is removed, and each temperature may have an "
+        f"offset of about {offset:.2g} % (with --vertical none, neither is done){largest}"
     )
 
 

@@ -55,7 +55,7 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
     if np.isnan(probability) or residuals.freedom < 4:  # a trend is a parabola with three constants
         return f"not tested: {residuals.scaled.size} points without known errors are too few; {size}"
     is_trend = probability < DOUBTFUL
-    about = f"(by chance with probability {probability:.2g}); {size}"
+    about = f"(probability that chance causes such a trend: {probability:.2g}); {size}"
     if is_trend and residuals.relative > WITHIN:
         return f"no: the residuals have a trend along {along} {about}"
     if residuals.errors > APPROXIMATE:

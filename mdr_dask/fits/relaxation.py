@@ -202,7 +202,7 @@ def _relaxation(case: xr.Dataset) -> Variables:
     passing = _passing_number(case)
     expected = law_rate(passing, one_value(case, "hurst"))
     return {
-        **measure("passing_number", passing, "v_1 tau q_max: relaxation time over the time to slide by 1 / q_max"),
+        **measure("passing_number", passing, "v_1 tau q_max: relaxation time divided by time to slide by 1 / q_max"),
         **constants,
         **measure("law_rate", expected, "rate b by eq. 4.12"),
         **_closed_law(case, expected),

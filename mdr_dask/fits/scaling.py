@@ -157,7 +157,9 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
     return {
         **constant("friction_over_slope", ratio, count, meaning, positive=True),
         **measure(
-            "fall", float(mean[beyond].max() / mean[beyond].min()), "largest over smallest mu beyond the maximum"
+            "fall",
+            float(mean[beyond].max() / mean[beyond].min()),
+            "largest mu divided by smallest mu, beyond the maximum",
         ),
         **measure("friction_follows", found.holds(where), SLOPE_FOLLOWED),
     }
