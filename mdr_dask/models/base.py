@@ -218,7 +218,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Coordinate:
-    """The values along a dimension of an output, with their unit and meaning."""
+    """The values along a dimension of an output, and the unit and the meaning of these values."""
 
     values: FloatArray
     unit: str

@@ -127,7 +127,7 @@ def test_a_film_thicker_than_a_tenth_of_the_radius_is_warned_of() -> None:
         ({}, "expected either load_parameter or line_load, got neither"),
         (CHECKED | {"line_load": 1.0}, "got load_parameter and line_load"),
         ({k: v for k, v in DIMENSIONAL.items() if k != "radius"}, "line_load needs radius"),
-        (CHECKED | {"viscosity_law": "roelands"}, "roelands needs the parameter viscosity"),
+        (CHECKED | {"viscosity_law": "roelands"}, "roelands` needs the parameter `viscosity`"),
         (CHECKED | {"speed_parameter": 0.0}, "greater than 0"),
         (CHECKED | {"inlet": 1.0}, "less than 0"),
         (CHECKED | {"profile_start": 3.0}, "expected a profile_end above the profile_start 3, got 2"),

@@ -83,12 +83,12 @@ class EhlLineParameters(Parameters):
         "barus", description="law by which the viscosity grows with the pressure"
     )
     compressible: bool = Field(
-        True, description="whether the density grows with the pressure, by the law of Dowson and Higginson"
+        True, description="whether the density grows with the pressure according to the law of Dowson and Higginson"
     )
     inlet: float | None = quantity(
         "1",
-        "position x/a at which the oil film begins, in Hertzian half widths a; negative, because the middle of the "
-        "contact is at 0. If inlet is not given, the contact is fully flooded",
+        "position x/a at which the oil film begins, with the Hertzian half width a. The position is negative, because "
+        "the middle of the contact is at 0. If inlet is not given, the contact is fully flooded",
         lt=0,
         default=None,
     )
@@ -124,7 +124,7 @@ class EhlLineParameters(Parameters):
             if missing:
                 raise ValueError(f"{dimensional} needs {' and '.join(missing)}")
         if self.viscosity_law == "roelands" and self.viscosity is None:
-            raise ValueError("viscosity_law: roelands needs the parameter viscosity")
+            raise ValueError("`viscosity_law: roelands` needs the parameter `viscosity`")
         if self.profile_end <= self.profile_start:
             raise ValueError(
                 f"expected a profile_end above the profile_start {self.profile_start:.9g}, got {self.profile_end:.9g}"
@@ -162,7 +162,7 @@ OUTPUTS = (
     Output(
         "traction_coefficient",
         "1",
-        "traction coefficient: shear force in the middle of the film divided by the load",
+        "traction coefficient: integral of the shear stress in the middle of the film, divided by the load",
         default=False,
         has_error=True,
     ),

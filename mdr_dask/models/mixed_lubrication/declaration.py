@@ -75,8 +75,8 @@ class MixedLubrication(Parameters):
     )
     cutoff_force: float = quantity(
         "N",
-        "normal force, used only with longest_wavelength: auto; the contact width under this force is the longest "
-        "wavelength. Usually the largest force of the rig",
+        "normal force, used only with longest_wavelength: auto. The contact width under this force is the longest "
+        "wavelength. This force is usually the largest force of the rig",
         usual="1600 N",
         default=1600,
         gt=0,

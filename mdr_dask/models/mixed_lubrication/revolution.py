@@ -26,8 +26,8 @@ class Revolution:
     """Intimate contact during one revolution of the rollers.
 
     A window is the part of both lines that is in the Hertzian contact at one instant. The windows are equidistant in
-    time, and their distance on the lines is `stride` points. `contact` times `unit` is the length in intimate contact
-    in each window, in m. `parts` is the number of equal parts into which the revolution is divided.
+    time. The distance between neighbouring windows is `stride` points. `contact` times `unit` is the length in intimate
+    contact in each window, in m. `parts` is the number of equal parts into which the revolution is divided.
     """
 
     contact: IntArray

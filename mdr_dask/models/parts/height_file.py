@@ -395,7 +395,7 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return an index and a unit for each of the columns x, y and z. Return () if one of these columns is missing.
+    """Return the index and the unit of each of the columns x, y and z. Return () if one of these columns is missing.
 
     If the columns have no names, there must be exactly three columns apart from row numbers: x, y and z, in this order.
     """

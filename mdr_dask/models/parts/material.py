@@ -243,7 +243,7 @@ def fit_notes(material: Material) -> tuple[str, ...]:
 
 
 def _table_notes(material: Material) -> tuple[str, ...]:
-    """Return notes on a table of moduli: the use of b_T, and a temperature outside the table."""
+    """Return notes on a table of moduli: on the use of b_T, and on a temperature outside the table."""
     table, temperature = material.dma_table, material.temperature
     if table is None:
         return ()

@@ -29,7 +29,7 @@ SAME_TEMPERATURE = 1.0  # K; rows of a table whose temperatures differ by at mos
 
 
 class ModulusTable(NamedByFile):
-    """A Prony series fitted to a table of frequency, storage and loss modulus, measured at one or more temperatures."""
+    """A Prony series fitted to a table of frequencies and moduli, which are measured at one or more temperatures."""
 
     renamed: ClassVar[Mapping[str, str]] = {"arms_per_decade": "write terms_per_decade"}
     file: NamedFile = Field(

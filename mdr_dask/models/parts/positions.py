@@ -117,13 +117,13 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 
 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Also return remarks.
+    """Replace codes for missing points, such as 9999, by NaN. Return the heights and remarks.
 
     The largest number is replaced if its distance from the next smaller number exceeds the range of the inner numbers,
     which are all numbers without the smallest and the largest. The same applies to the smallest number. A number that
-    occurs only once may be the height of a narrow groove or peak. Such a number is replaced only if the distance
-    exceeds `SAFETY` times the range. A surface such as a grating, with at most `FEW_LEVELS` distinct inner numbers, is
-    left unchanged.
+    occurs only once may be the height of a narrow groove or peak. Such a number is replaced only if its distance from
+    the next number exceeds `SAFETY` times the range. A surface such as a grating, with at most `FEW_LEVELS` distinct
+    inner numbers, is left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

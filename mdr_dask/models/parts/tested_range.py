@@ -41,7 +41,7 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
     if largest <= LARGEST_LOAD:
         return ()
     return (
-        f"F_N / (E* L h) of up to {largest:.2g}: above {LARGEST_LOAD:g} the computed friction is too small "
+        f"F_N / (E* L h) reaches {largest:.2g}; above {LARGEST_LOAD:g}, the computed friction is too small "
         f"by a factor that grows with the load ({PAGE})",
     )
 
