@@ -175,8 +175,8 @@ UNFIT = [
         "no statistic is called 'medan' (did you mean 'mean'?)",
     ),
     (lambda study: mdr_dask.plot(xr.Dataset(), "velocity"), "expected a study as returned by run or open"),
-    (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps a single"),
-    (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
+    (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps"),
+    (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "the dimension 'realisation'"),
 ]
 
 

@@ -189,7 +189,7 @@ def test_words_are_ticks_and_cases_without_value_are_marked(tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("view", "message"),
     [
-        (View("friction", "velocity"), "friction, which is not an output"),
+        (View("friction", "velocity"), "this study has no output 'friction'"),
         (View(MU, "velocty"), "did you mean 'velocity'"),
         (View(MU, "rms_roughness"), "is fixed"),
         (View(MU, "velocity", by="velocity"), "requested twice"),
