@@ -88,7 +88,7 @@ def test_lists_of_a_structure_vary_together(tmp_path):
 MISTAKES = [
     ("[[{cycles: 10}], {cycles: 5}]", "4:59: parameters.history: expected a list, got a mapping"),
     ("[[{cycles: 10}], [{cycles: 10.0}]]", "4:59: parameters.history: this value is given twice: [{cycles: 10.0}]"),
-    ("[[{cycles: 10}]], cycles: [1, 2]", "history replaces cycles: leave out history or cycles"),
+    ("[[{cycles: 10}]], cycles: [1, 2]", "`history` replaces `cycles`: leave out one of them"),
     ("[[{cycles: 10}], [{cycles: -1}]]", "4:69: parameters.history[0].cycles: expected a number of at least 0, got -1"),
 ]
 

@@ -246,19 +246,19 @@ class FrettingWear(Parameters):
             )
         if isinstance(self.indenter, Table) and self.depth is None:
             raise ValueError(
-                "a table of a profile needs the indentation depth: give depth instead of normal_force or stick_radius"
+                "a table of a profile needs the indentation depth: give `depth`, not `normal_force` or `stick_radius`"
             )
         if self.wear_rule == "fast" and self.hold == "force":
             raise ValueError(FAST_AT_DEPTH)
         if self.wear_rule != "exact" and (self.history or self.path is not None):
             name = "history" if self.history else "path"
-            raise ValueError(f"expected wear_rule: exact, because a {name} is given, got {self.wear_rule!r}")
+            raise ValueError(f"expected wear_rule: exact, because `{name}` is given, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
-                raise ValueError(f"{name} replaces {other}: leave out {name} or {other}")
+                raise ValueError(f"`{name}` replaces `{other}`: leave out one of them")
         if self.dimensionless and self.last_radius is not None:
             raise ValueError(
-                "last_radius is a length: in a dimensionless campaign, give extent (last radius / a0) instead"
+                "last_radius is a length: in a dimensionless campaign, give `extent` (last radius / a0) instead"
             )
         return self
 

@@ -134,7 +134,7 @@ def _realise(
         if with_length:  # conductance and resistance have the same relative error as the length
             of_all = errors[-1, k] / max(found[k].length / operation.width, _FLOORS["contact_length"])
             relative |= dict.fromkeys(("contact_length", "contact_conductance", "contact_resistance"), of_all)
-        advice = "" if operation.case.points == "auto" else " (increase points)"
+        advice = "" if operation.case.points == "auto" else " (increase `points`)"
         _store(result, block, (index, position), numbers, relative, advice)
 
 

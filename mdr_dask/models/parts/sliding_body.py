@@ -94,7 +94,7 @@ class SlidingBody(Parameters):
         both = [name for name in GENERATED if getattr(self, name) is not None]
         if self.surface is None:
             if self.hurst is None:
-                raise ValueError("expected hurst, because generated roughness needs it, got none")
+                raise ValueError("expected `hurst`, because generated roughness needs a Hurst exponent, got none")
         elif both:
             raise ValueError(f"surface replaces {', '.join(both)}: leave out surface, or {', '.join(both)}")
         elif self.surface.profile is not None and self.length is not None:
@@ -102,7 +102,7 @@ class SlidingBody(Parameters):
                 "leave out `length`, because the file of `surface: {profile: ...}` determines the length of the line"
             )
         elif self.surface.profile is None and self.length is None:
-            raise ValueError("expected length, the length of the rough line that represents the surface, got none")
+            raise ValueError("expected `length`, the length of the rough line that represents the surface, got none")
         self.require_one_alternative()
         return self
 

@@ -54,12 +54,12 @@ class Surface(Parameters):
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
             raise ValueError(
-                "a profile has its own options shortest_wavelength and longest_wavelength, and no option extrapolate: "
+                "a profile has its own options shortest_wavelength and longest_wavelength, but no `extrapolate`: "
                 "write profile: {file: ..., shortest_wavelength: ...}"
             )
         if self.extrapolate and not any(ends):
             raise ValueError(
-                "extrapolate needs longest_wavelength or shortest_wavelength, up to which the spectrum is continued"
+                "`extrapolate` needs longest_wavelength or shortest_wavelength, up to which the spectrum is continued"
             )
         if info.context is not None and self.profile is None:
             check_in_campaign(info, lambda: spectra_of(self))
@@ -167,7 +167,7 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
             most, least, last, first = (shown(end, "m", 9) for end in ends)
             raise DataError(
                 f"{file.name}: expected wavelengths of the line in the range {least} to {most}, got {first} to {last}: "
-                "change length or points"
+                "change `length` or `points`"
             )
         line.flags.writeable = False
     return lines
