@@ -78,8 +78,8 @@ def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference `one` minus `other` of two stacks with the same resamples.
 
-    After the resamples, rows with shifts by the errors of `one` come first, then rows with shifts by the errors of
-    `other`.
+    The rows that follow the resamples are the difference of the means, shifted first by the errors of `one` and then
+    by the errors of `other`.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]

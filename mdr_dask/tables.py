@@ -521,8 +521,8 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
     """Return, for each column of the sheet, its `Column`, its unit, and whether its entries are common logarithms.
 
     The `Column` is one of `columns`, or None for an unknown column of the sheet. In a sheet without names, `columns`
-    describes the columns of the sheet in order. If no name in the sheet means a needed `Column`, the only unknown
-    column with the same dimension is taken, provided that no other `Column` has this dimension.
+    describes the columns of the sheet in order. A needed `Column` that no name in the sheet means is
+    assigned to the unknown column with its dimension, if there is only one such column and only one such `Column`.
     """
     if not sheet.names:
         count = len(sheet.units)

@@ -181,7 +181,7 @@ def undetermined(found: Posterior, is_open: BoolArray) -> list[int]:
 
 
 def _reduction(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Fit a quadratic function of the unknowns `by` to unknown `k`; return the fraction of spread that it explains."""
+    """Return the fraction of the spread of unknown `k` that a quadratic function of the unknowns `by` explains."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)

@@ -171,7 +171,7 @@ def _is_numeric(data: xr.Dataset, dim: str) -> bool:
 
 
 def needed(curve: xr.Dataset) -> xr.Dataset:
-    """Return a curve without the values of an adaptive axis at which no result was needed."""
+    """Return a curve with only those values of an adaptive axis for which results were needed."""
     if "status" not in curve:
         return curve
     spared = (curve["status"] == Status.NOT_NEEDED).all("realisation")

@@ -32,9 +32,9 @@ CLAIMS = ".claims/"
 RECORD_FOLDER = ".layout"
 #: Files and folders that a store may contain if its first run was stopped before it created the arrays.
 KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
-#: Time in s between two heartbeats of a run with a claim (`mdr_dask.store.locks`). After 4 times this time, a run
-#: without a heartbeat counts as ended, and a request to a server without an answer fails. Chosen by trial: a server may
-#: answer late, and the clocks of two machines may differ by some seconds.
+#: Time in s between two heartbeats of a run with a claim (`mdr_dask.store.locks`). A run counts as
+#: ended if it writes no heartbeat in 4 times this time. A request fails if the server does not answer in 4 times this
+#: time. Chosen by trial: a server may answer late, and the clocks of two machines may differ by some seconds.
 BEAT = 20.0
 #: Version of the layout. Stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2

@@ -151,7 +151,7 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. A film in units of ``a^2/R`` times this factor is ``h/R``."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, the factor from ``H = h R/a^2`` to ``h/R``."""
     return 8 * W / np.pi
 
 

@@ -2,9 +2,10 @@
 
 The unit of length is the cell width, which is the distance between neighbouring nodes. The Deborah number De is the
 distance v tau divided by the cell width. Inside a cell, the penetration w (depth plus height) is a cubic. The places
-where contact begins and ends are computed approximately. The load is the integral of w in contact, and of the
-displacement u out of contact. The drag is the integral of De w'^2 in contact and of u^2 / De out of contact. All
-integrands of the drag are positive, so that nothing cancels in slow sliding.
+where contact begins and ends are computed approximately. The load is the integral of w over the contact, plus
+the integral of the displacement u over the rest of the line. The drag is the integral of De w'^2 over the contact, plus
+the integral of u^2 / De over the rest. All integrands of the drag are positive, so that nothing cancels in slow
+sliding.
 
 If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms. In all
 other blocks, the solver follows one element from cell to cell. The results of a case do not depend on other cases in

@@ -21,9 +21,10 @@ class Travelling(NamedTuple):
     """A sliding solid and the recovery modes of the solid.
 
     Stresses are divided by the static modulus, and lengths by the cell width. The Prony terms are in ascending order of
-    the Deborah number tau_m v / dx. `times` are the decay lengths of the recovery modes. Row k of `stretch_of` contains
-    the stretches of all Prony terms if recovery mode k alone has the strain 1. Row m of `amplitude_of` contains the
-    strains of all recovery modes if Prony term m alone has the stretch 1.
+    the Deborah number tau_m v / dx. `times` are the decay lengths v t of the recovery modes, where t is
+    the decay time of a mode. Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k alone
+    has the strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m alone has the
+    stretch 1.
     """
 
     moduli: FloatArray

@@ -87,7 +87,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     left, back = np.exp(-time), last
     shallowest, deepest, least_lift = depth, depth, depth + rate
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
-    if first.deborah > deborah:  # drift u (1 - D / D_1) of elements free since before the jump
+    if first.deborah > deborah:  # elements that separated before the jump have the drift u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     for k in range(WINDOWS):
         since = time - WINDOW / deborah * 2.0**k

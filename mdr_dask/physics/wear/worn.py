@@ -231,8 +231,8 @@ def worn_by(
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
     """Return g - g0 outside a scar of radius a, where f = f0 and the half-integral of the change vanishes.
 
-    The change is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The substitutions are
-    t = a cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
+    The change is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The first
+    substitution is t = a cos(phi), and the second is sin(phi) = sqrt((x / a)^2 - 1) sinh(w).
     """
     c, a = scar.border, scar.radius
     s = np.sqrt((position - a) * (position + a))
