@@ -79,7 +79,7 @@ def test_numbers_without_units_are_asked_about_beside_other_problems():
 @pytest.mark.parametrize("number", [".inf", ".nan", "1e999", "1" * 299])
 def test_numbers_of_any_size_are_refused_beside_other_problems(number):
     text = CAMPAIGN.replace("0.5 um", number).replace("velocity: {", "velocity: {linear: [1, 2, 3], ")
-    with pytest.raises(CampaignError, match="expected one of the keys"):
+    with pytest.raises(CampaignError, match="expected exactly one of the keys"):
         loads(text, "study.yaml", ".")
 
 

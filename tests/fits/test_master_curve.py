@@ -72,7 +72,7 @@ def test_friction_of_a_smooth_body_is_taken_off():
 
 
 def test_store_without_the_axes_is_refused():
-    with pytest.raises(DataError, match="roughness that varies normal_force and velocity"):
+    with pytest.raises(DataError, match="roughness and varies normal_force and velocity"):
         FITS[0].compute({"": store().isel(velocity=0)})
 
 

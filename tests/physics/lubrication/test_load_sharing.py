@@ -36,7 +36,7 @@ def test_mean_overlap_is_the_integral_over_gaussian_heights(distance: float) -> 
 def test_gap_between_the_lines_is_the_film(gap: float) -> None:
     distance = distance_of_means(gap)
     assert mean_overlap(-distance) == pytest.approx(gap, rel=1e-9)
-    assert distance <= gap
+    assert distance <= gap * (1 + 1e-12)
     if gap >= 3:
         assert distance == pytest.approx(gap, rel=2e-4)  # far apart, the film is the distance
 
