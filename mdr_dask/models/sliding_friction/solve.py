@@ -19,7 +19,7 @@ from mdr_dask.physics.sliding.cases import COLUMNS, Steady
 from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
-OPERATIONS_A_POINT = 20  # operations of a solution for each point of the line, chosen by trial for block sizes
+OPERATIONS_A_POINT = 10  # operations of a solution for each point of the line, chosen by trial for block sizes
 
 #: Outputs that have errors, each with the corresponding column of `Steady`.
 OUTPUTS = dict(
