@@ -23,5 +23,5 @@ def is_geometric(values: Any) -> bool:
 
 
 def random_stream(seed: int, realisation: int) -> np.random.Generator:
-    """Return a generator that gives a realisation the same random numbers in every case and every model."""
+    """Return the random generator of a realisation. It gives the same numbers in every case and every model."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))

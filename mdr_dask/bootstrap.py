@@ -94,7 +94,7 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return a sum over all groups. Each group adds the larger of its two shifts (rows), or 0 if both are negative."""
+    """Return the sum over all groups of the larger shift of each group, or of 0 if both shifts are negative."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach

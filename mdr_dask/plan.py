@@ -24,12 +24,13 @@ from mdr_dask.models.numbers import numbers_of
 #: only milliseconds to schedule and write.
 OPERATIONS = 1e9
 #: A small study is cut into about `FEW_BLOCKS` blocks, so that several workers can share it. If possible, a block has
-#: at least `LEAST` operations.
+#: at least `LEAST` operations. Both are chosen by trial.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share a part of the computation are always halved if they need more operations than this.
+#: Chosen by trial.
 MOST_SHARED = 30 * OPERATIONS
 #: If cases share work, blocks of at most `MOST_SHARED` operations are halved only if the operations of all blocks
-#: together increase by less than this factor.
+#: together increase by less than this factor. Chosen by trial.
 REPEATED_WORK = 1.15
 #: Largest number of blocks of a series whose operations are counted; it keeps `check` fast. Chosen by trial.
 SAMPLED = 1000
@@ -368,7 +369,7 @@ def _growth(series: Series) -> float:
 
 
 def _operations(template: Template) -> float:
-    """Estimate the number of operations of a series from some blocks of the series."""
+    """Estimate the number of operations of a series from at most `SAMPLED` of its blocks."""
     lengths, realisations = template.grid[:-1], template.sizes["realisation"]
     blocks = math.prod(lengths)
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)

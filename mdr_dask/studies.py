@@ -373,7 +373,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases. A number is left out if the study lacks a quantity in its formula."""
+        """All dimensionless numbers of the cases whose formulas contain only quantities of the study."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})

@@ -79,7 +79,7 @@ FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the f
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Move ``law_holds`` to the end of a result. If the fit gives no verdict, ``law_holds`` becomes *not tested*."""
+    """Return a result whose last variable is ``law_holds``; it is *not tested* if the fit gives no verdict."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 

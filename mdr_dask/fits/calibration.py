@@ -38,14 +38,13 @@ from mdr_dask.fits.posterior import (
     written,
 )
 from mdr_dask.fits.prediction import Prediction, prediction
+from mdr_dask.physics.refine import CLOSE
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
 #: A calibration tries `DEVIATIONS` sizes of the measurement error. The smallest size is `LEAST` times the rms residual
 #: of the best prediction, because the scatter of the lines may cause most of the residual. Chosen by trial.
 LEAST, DEVIATIONS = 0.2, 14
-#: Smallest rms residual, as a fraction of the rms measured value. Smaller residuals may be due to rounding.
-_ROUNDING = float(np.sqrt(np.finfo(float).eps))
 
 
 @dataclass(frozen=True)
@@ -187,9 +186,9 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 
     def by_residuals(places: FloatArray) -> FloatArray:
         mean = predicted(places).mean
-        size = np.maximum(np.abs(mean), _ROUNDING * np.abs(values).max())
+        size = np.maximum(np.abs(mean), CLOSE * np.abs(values).max())
         squares = np.stack([((values - mean) ** 2).mean(axis=1), ((values / size - 1) ** 2).mean(axis=1)], axis=1)
-        squares = np.maximum(squares, _ROUNDING**2 * np.array([np.mean(values**2), 1.0]))
+        squares = np.maximum(squares, CLOSE**2 * np.array([np.mean(values**2), 1.0]))
         least[:] = np.minimum(least, squares.min(axis=0))
         density: FloatArray = -count / 2 * np.log(squares)
         density[:, 1] -= np.log(size).sum(axis=1)

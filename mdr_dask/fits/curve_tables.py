@@ -226,7 +226,7 @@ def curves_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Divide measured values, which scatter about a few nominal values, into groups; return the group of each value.
+    """Return the index of the nominal value of each measured value; measured values scatter about nominal values.
 
     The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
     each distinct value is a group of its own. But values that are close to each other form one group, as rounded

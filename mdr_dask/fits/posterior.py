@@ -18,6 +18,7 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.bootstrap import CONFIDENCE
 from mdr_dask.fits.base import APPROXIMATE
 from mdr_dask.fits.prediction import Predicted, Prediction
+from mdr_dask.physics.refine import CLOSE
 
 #: Number of cells before refinement, and smallest number of cells that a refinement divides. Chosen by trial: with
 #: fewer cells, a refinement may miss a narrow maximum.
@@ -128,7 +129,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
     places = np.stack([each.ravel() for each in np.meshgrid(*[axis] * unknowns, indexing="ij")], axis=1)
     halves = np.stack(np.meshgrid(*[[-0.25, 0.25]] * unknowns, indexing="ij"), axis=-1).reshape(-1, unknowns)
     each = likelihood(places)
-    while width > np.sqrt(np.finfo(float).eps):
+    while width > CLOSE:
         kept = _kept(np.logaddexp.reduce(each, axis=1), MOST // len(halves))
         places = (places[kept, None] + width * halves).reshape(-1, unknowns)
         width /= 2

@@ -31,6 +31,7 @@ from mdr_dask.fits.cases import (
     table_of,
 )
 from mdr_dask.fits.jumps import LAW, LEVELS, MODELS, each_jump, jump_law, jumps_of
+from mdr_dask.physics.refine import CLOSE
 
 # the following four numbers were chosen by trial
 WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
@@ -155,7 +156,7 @@ def _fit_case(case: xr.Dataset) -> Relaxation | None:
         np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(of_after), 0.0, of_after), 0.0)
     )
     good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
-    rounding = np.sqrt(np.finfo(float).eps) * jumps_of(case).slope[0]
+    rounding = CLOSE * jumps_of(case).slope[0]
     if len(good) < 2 or not np.abs(good.mean(axis=0)).max() > rounding:
         return None
     means = bootstrap.means(bootstrap.complete(relaxing))

@@ -39,11 +39,13 @@ class Top(NamedTuple):
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     """Fit a parabola near the largest friction to a stack of friction at ascending x = ln(velocity)."""
-    drop, left = 2 * TOP, stack
-    while left is stack or (left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL):
-        drop /= 2
+    drop = TOP
+    while True:  # ends at the latest when three points are left
         near = _about_the_top(stack[0], drop)
         top, at, rise, left = _parabola(x[near], stack[:, near])
+        if left.shape[1] <= 3 or bootstrap.chance(left, count) >= DOUBTFUL:
+            break
+        drop /= 2
     resamples = top[1 : 1 + bootstrap.RESAMPLES]  # a resample that contains only failed lines is NaN
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:

@@ -99,7 +99,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert a text such as ``20 mm`` to SI units. Keep names such as ``auto``."""
+        """Convert a text such as ``20 mm`` to a number in SI units. Return a name such as ``auto`` unchanged."""
         if isinstance(value, list | tuple):
             return tuple(to_si(item, info) for item in value)
         value = unquoted(value)

@@ -113,7 +113,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the parameters `value` of a campaign. If they include a measured surface, add ``hurst: None``.
+    """Return a copy of the parameters `value`, with ``hurst: None`` added if they contain a measured surface.
 
     `surface` is the name of the parameter that contains the surface. If `value` already contains `hurst`, nothing is
     added. The default of `hurst` is for generated roughness only.

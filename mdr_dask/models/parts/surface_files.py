@@ -219,7 +219,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
     line = line_of_scan(scans, file)
     with file.in_errors():
         cut = cut_of_lines([line], scans.window == "hann")
-        limit = noise_limit(cut, -1.0, 0.5)
+        limit = noise_limit(cut, roughness=-1.0, decades=0.5)
         spectrum, error = of_cut(cut.until(limit))
     remarks = (*scan_of(scans, file).remarks, *doubts_of_line(line, scans.detrend))
     return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, remarks, error)
@@ -240,7 +240,7 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
         spectrum, limit = rings.spectrum(), noise_limit(rings.binned())
     else:
         axis = "xy".index(maps.direction)
-        spectrum, limit = rings.along(axis), noise_limit(averaged(*rings.cuts[axis], 1.0), -1.0)
+        spectrum, limit = rings.along(axis), noise_limit(averaged(*rings.cuts[axis], 1.0), roughness=-1.0)
     return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, levelled.remarks)
 
 

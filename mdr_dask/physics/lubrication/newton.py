@@ -226,7 +226,7 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Write to `b` the right side of the equations for a step with a reused Jacobian.
+    """Write the right-hand side of the equations to `b`, for a Newton step that reuses an earlier Jacobian.
 
     The pressures at all inactive nodes must be zero.
     """

@@ -29,11 +29,11 @@ LANES = 8  # number of cases in one vector instruction: the widest vector regist
 
 # Rows of `Lanes.sums`, and the number of these rows
 CARRIED, STIFFNESS, DRAG, SUMS = range(4)
-# Columns of `Nodal.blocks`. STEEPEST is the smallest (most negative) rise. BEFORE is the height before the block.
-# HEIGHTS, RISES, WORK and SQUARES are the sums of height, rise, height times rise, and rise squared over the block.
+# Columns of `Nodal.blocks`: largest and smallest height, steepest fall (a negative rise), height before the block, and
+# the sums of height, rise, height times rise, and rise squared over the nodes of the block
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
-# Rows of `Lanes.state`, and the number ROWS of these rows. U is the displacement u, and FADE is du/d(depth). THROUGH is
-# the decay factor of u over a free block. MEMORY is the sum of u over a free block if u is 1 just before the block.
+# Rows of `Lanes.state`, and their number. U is the displacement u, and FADE is du/d(depth). THROUGH is the factor by
+# which u decays over a free block. MEMORY is the sum of u over a free block if u is 1 just before the block.
 # LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block.
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS, ROWS = range(8)
 

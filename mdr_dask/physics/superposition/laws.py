@@ -15,6 +15,7 @@ from scipy.special import chdtrc, stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
+from mdr_dask.physics.refine import CLOSE
 from mdr_dask.physics.solids import GAS_CONSTANT
 
 
@@ -71,9 +72,8 @@ def fit_wlf(
     c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
-    rounding = float(np.sqrt(np.finfo(float).eps))
-    straight = rounding / float(np.ptp(temperature))  # below this value of 1 / c2, factors are linear in temperature
-    steepest = (1 - rounding) / lowest if lowest > 0 else np.inf
+    straight = CLOSE / float(np.ptp(temperature))  # below this value of 1 / c2, factors are linear in temperature
+    steepest = (1 - CLOSE) / lowest if lowest > 0 else np.inf
 
     def law(constants: FloatArray, at: FloatArray) -> FloatArray:
         distance = at - temperature[anchor]

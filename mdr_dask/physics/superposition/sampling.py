@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from scipy.special import softmax
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.refine import EPS
 from mdr_dask.physics.superposition.posterior import CELLS, STEP_SCATTER, Curves, Solved, solve, step_covariance
 
 HOPS = 2
@@ -169,7 +170,7 @@ def _best(curves: Curves, start: FloatArray, fixed: int = 0) -> FloatArray:
 def _scale(curves: Curves, best: FloatArray) -> FloatArray:
     """Return a matrix S such that S S^T approximates the covariance of the parameters."""
     known = curves.prior[1]
-    step = np.cbrt(np.finfo(float).eps / np.diag(known) ** 1.5)  # balances rounding and truncation errors
+    step = np.cbrt(EPS / np.diag(known) ** 1.5)  # balances rounding and truncation errors
     rows = np.concatenate([best + np.diag(step), best - np.diag(step)])
     plus, minus = np.split(solve(curves, rows).gradient, 2)
     bend = (plus - minus) / (2 * step[:, None])

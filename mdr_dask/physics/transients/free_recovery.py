@@ -24,7 +24,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.refine import MOST_ITERATIONS
-from mdr_dask.physics.transients.patches import CLOSE, History, Patches, Track, height_at
+from mdr_dask.physics.transients.patches import AT_EDGE, History, Patches, Track, height_at
 
 STRIDE = 2.0  # longest step in the search for a place of separation, in cells
 ROUNDING = 1e-9  # smaller distances (in cells) and smaller relative differences of displacements may be due to rounding
@@ -169,7 +169,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
         force = d + h + rate + deborah * slope
         falls = (rate + change) / deborah + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
-        if abs(step) < CLOSE:
+        if abs(step) < AT_EDGE:
             if s + step > x:  # the element at x has not reached the place of zero force yet
                 break
             fade = np.exp(-since)
@@ -184,7 +184,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
         s += min(max(step, -STRIDE), STRIDE)
         if not low < s < high:
             s = 0.5 * (low + high)
-        if high - low < CLOSE:
+        if high - low < AT_EDGE:
             break
     return -1.0, 0.0, 0.0
 
@@ -283,7 +283,7 @@ def contact_begin(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2.0
-        if abs(step) < CLOSE or high - low < ROUNDING:
+        if abs(step) < AT_EDGE or high - low < ROUNDING:
             if 2 * abs(bend * step) < slope:
                 step /= 1 + 0.5 * bend * step / slope
                 slope += bend * step
@@ -299,7 +299,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
     The search stops at the first place where the line is above the free elements.
     """
     x, gap = high, -1.0
-    while gap <= 0 and high - low > CLOSE:
+    while gap <= 0 and high - low > AT_EDGE:
         x = 0.5 * (low + high)
         gap, slope, _, _, _ = gap_at(now, recovery, x)
         if slope > 0:

@@ -17,7 +17,7 @@ from mdr_dask.physics.refine import MOST_ITERATIONS
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
-CLOSE = 1e-2  # in cells; the search for an edge of contact ends after a shorter step s, with an error of about s^3
+AT_EDGE = 1e-2  # in cells; the search for an edge of contact ends after a shorter step s, with an error of about s^3
 # Entries of the sums over the patches; load and drag are divided by 4 G dx
 (
     LOAD,
@@ -148,7 +148,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
             high = x
         falls = q + x * (2 * r + x * 3 * c)
         step = -value / falls if falls < 0 else NONE
-        if abs(step) < CLOSE:
+        if abs(step) < AT_EDGE:
             bend = (r + 3 * c * x) / falls  # for a step of Halley's method
             return min(max(x + step / (1 + bend * step) if abs(bend * step) < 0.5 else x + step, y), 1.0)
         x = x + step if low < x + step < high else 0.5 * (low + high)

@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import SLOWEST, Factors, factorise
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.refine import CLOSE
+from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.wear.slip import GrossSlip, Moment, PartialSlip
 
 #: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
@@ -134,7 +134,7 @@ class _Newton:
     ) -> FloatArray | None:
         """Return the solution, or None if the changes grow, or if they shrink too slowly with a reused Jacobian."""
         is_reused, last = self.factors is not None, np.inf
-        while True:
+        for _ in range(MOST_ITERATIONS):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
             if not np.isfinite(residual).all():
                 return None
@@ -157,6 +157,7 @@ class _Newton:
             if rate > SLOWEST:
                 self.factors = None
             last = size
+        return None
 
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray

@@ -304,7 +304,7 @@ def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return radii that divide the range from c to the border, densest at the border, where the image is steep."""
+    """Return radii between c and the border at which integrals are split; they are closest together at the border."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)

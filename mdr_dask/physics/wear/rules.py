@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.refine import CLOSE, EPS
+from mdr_dask.physics.refine import CLOSE, EPS, MOST_ITERATIONS
 from mdr_dask.physics.wear.worn import (
     Scar,
     Worn,
@@ -220,7 +220,7 @@ def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_val
     # the order of the method is 1.7: if the integral is this small, the next radius is exact except for rounding
     tolerance = CLOSE * low_value
     radius, replaced = (low * high_value - high * low_value) / (high_value - low_value), 0
-    while True:
+    for _ in range(MOST_ITERATIONS):
         value, last = _scar_integral(rule, radius, 0, cuts), radius
         share = 1.0 - value / (low_value if value > 0.0 else high_value)
         share = share if share > 0.0 else 0.5
@@ -232,7 +232,8 @@ def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_val
             high, high_value, replaced = radius, value, 1
         radius = (low * high_value - high * low_value) / (high_value - low_value)
         if abs(value) < tolerance or abs(radius - last) < 2.0 * EPS * radius:
-            return radius
+            break
+    return radius
 
 
 @jit

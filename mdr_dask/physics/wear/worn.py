@@ -125,7 +125,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def closed(profile: Profile, scar: Scar, high: float = 1.5) -> Scar:
-    """Return the scar with its radius, where worn and virgin profile meet. The radius is 1 if nothing is worn.
+    """Return the scar with its radius, at which worn and virgin profile meet. If nothing is worn, the radius is 1.
 
     `high` is a first estimate of an upper bound of the radius.
     """

@@ -346,7 +346,7 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
 
 
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
-    """Replace each time that differs from the start of a piece only by a rounding error with the start of the piece."""
+    """Return the times; a time that is a start of a piece except for rounding becomes exactly this start."""
     nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
     found: FloatArray = np.where(np.isclose(times, nearest, rtol=1e-12, atol=0), nearest, times)
     return found
