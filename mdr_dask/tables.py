@@ -329,9 +329,9 @@ def _head(grid: _Grid, data: BoolArray, width: int) -> _Head:
 
     `data` is a mask of the lines of numbers, and `width` is the number of cells of most of these lines. A candidate is
     a line above the numbers with `width` cells. Without candidates, the last line above the numbers contains the names.
-    If the last candidate contains names with units, there is no line of units. If a candidate other than the first is a
-    line of units, the candidate above this line contains the names. Otherwise the last candidate contains the names,
-    and the candidate above the names may be the line of units.
+    If the last candidate contains names with units, there is no line of units. If a candidate below the first consists
+    of units, the candidate above it contains the names. If only the first of several candidates consists of units, the
+    last candidate contains the names. The candidate that remains above the names contains labels of columns.
     """
     full = np.flatnonzero(data & (grid.length == width))
     if not full.size:

@@ -146,7 +146,7 @@ def _are_valid(
             problems.add(column.origin.place, column.origin.name, _unknown(column, parameters))
         elif twice:
             problems.add(
-                column.origin.place, column.origin.name, "this parameter is given twice (keep one of the two places)"
+                column.origin.place, column.origin.name, "this parameter is given twice (delete one of the two)"
             )
         are_valid = are_valid and found is not None and not twice
         seen.add(column.path)

@@ -21,7 +21,7 @@ from mdr_dask.units import conversion, converts, is_unit
 if TYPE_CHECKING:
     from mdr_dask.physics.superposition.master_curve import Vertical
 
-# a gap between two groups of measured values is at least this many times as wide as a gap within a group; by trial
+# smallest ratio of a gap between two groups of measured values to a gap within a group, chosen by trial
 LEAST_JUMP = 3.0
 
 

@@ -4,8 +4,8 @@ Symbols: mu is the coefficient of friction, F_N is the normal force, and v is th
 and the rms height h. The body has the shear modulus G and the relaxation time tau.
 
 Friction against velocity has four regions. Friction is proportional to the velocity in region I, grows more slowly in
-region II, is at its plateau in region III, and falls in region IV. The load has two zones. In zone 1, at low loads, the
-line is in partial contact. In zone 2, the line is in full contact.
+region II, is at its plateau in region III, and falls in region IV. There are two zones of the load. In zone 1, at low
+loads, the line is in partial contact. In zone 2, the line is in full contact.
 """
 
 from __future__ import annotations

@@ -192,7 +192,7 @@ class Figure:
         return list(map(plain, [*lines, *self.remarks()]))
 
     def remarks(self) -> list[str]:
-        """Return a line for everything that is not drawn, every warning and every note."""
+        """Return one line for each thing that is not drawn, each warning and each note."""
         rest = [f"not drawn: {text}" for text in self.left_out]
         return [*rest, *(f"warning: {warning}" for warning in self.warnings), *self.notes]
 

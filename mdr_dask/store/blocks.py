@@ -43,7 +43,7 @@ class Place:
     index: BlockIndex
     # The part of the arrays that the block fills: one slice for each dimension, the last one for ``realisation``.
     region: tuple[slice, ...]
-    # The result of `layout_mark` in the main process of the run. A worker that gets another result raises an error.
+    # The digest of the layout when the run began (`layout_mark`). A worker that finds another layout raises an error.
     layout: str
     lock: Lock
 

@@ -75,7 +75,7 @@ def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
 
 
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
-    """Return the Zarr array with the given metadata. This function is faster than opening the group."""
+    """Return the Zarr array with the given metadata, without reading the metadata again."""
     return zarr.Array(zarr.AsyncArray(dict[str, Any](metadata), StorePath(store, path)))  # type: ignore[call-overload]
 
 

@@ -19,7 +19,7 @@ from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.lubrication import line_contact
 from mdr_dask.physics.refine import Solution, refine
 
-#: `_OF_LENGTH`: outputs that follow from the length in intimate contact. `_OF_LINES`: outputs that need rough lines.
+#: `_OF_LENGTH`: outputs that need the length in intimate contact. `_OF_LINES`: outputs that need rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
 #: Outputs that can be zero, each with a floor. If an output is below its floor, its absolute error is divided by the

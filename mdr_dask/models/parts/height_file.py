@@ -218,11 +218,11 @@ def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
     stated = channel.unit or ""
     unit = _one_unit(file, "unit", stated, units.height)
     if not unit:
-        raise DataError(f"{file.name}: does not state its unit: give `unit`, such as um")
+        raise DataError(f"{file.name}: the file does not state its unit: give `unit`, such as um")
     _one_unit(file, "x_unit", unit, units.position)
     if channel.physical_sizes is None:
         if units.spacing is None:
-            raise DataError(f"{file.name}: does not state its spacing: give `spacing`, such as 1 um")
+            raise DataError(f"{file.name}: the file does not state its spacing: give `spacing`, such as 1 um")
         steps = (units.spacing, units.spacing_y or units.spacing)
         metre = _metre(file, unit, "unit")
         sizes = tuple(n * step / metre for n, step in zip(channel.nb_grid_pts, steps, strict=False))

@@ -42,8 +42,7 @@ WAYS = [(place, kind) for kind in KINDS for place in ("wavenumber", "wavelength"
 
 
 class Found(NamedTuple):
-    """The spectrum C2D of a file within the range of the data.
-
+    """The spectrum C2D of a surface, limited to the wave numbers in its file.
     `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found. `error` contains
     the standard errors of log C2D if the spectrum was computed from the spectrum of straight profiles.
     """

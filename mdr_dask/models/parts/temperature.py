@@ -100,7 +100,7 @@ def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
     temperature, decades = table["temperature"][order], decades[order]
     if order.size < 2 or np.any(np.diff(temperature) <= 0) or np.any(np.diff(decades) >= 0):
         raise DataError(
-            f"{name}: expected two or more temperatures, and values of a_T that decrease with the temperature"
+            f"{name}: expected two or more different temperatures, and values of a_T that decrease with the temperature"
         )
     if not decades[-1] <= 0 <= decades[0]:
         raise DataError(

@@ -2,7 +2,7 @@
 
 A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``. The cluster breaks
 the layer if ``int (z - h0) dx > s D^3``, with the length D of the interval and the result s of `layer_strength` (eqs.
-5.5, 5.6). The contact zone is a window, which begins at each node in turn. Clusters are cut at the edges of the window.
+5.5, 5.6). The contact zone is a window that begins at each node in turn. Clusters are cut at the edges of the window.
 The lines are closed cubic splines: the first node follows the last node. All integrals are exact.
 """
 

@@ -83,8 +83,8 @@ def line_contact(
     groups : tuple of float
         Load, speed and material parameters W, U and G, defined with ``E' = 2 E*`` and the mean velocity.
     E_star : float
-        Contact modulus in Pa. The maximum pressure p0, which follows from `E_star` and W, makes the density law and
-        Roelands' law dimensionless.
+        Contact modulus in Pa. The maximum pressure p0, which follows from `E_star` and W, is the unit of pressure in
+        the density law and in Roelands' law.
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional

@@ -37,7 +37,7 @@ CELL_LEVELS = tuple(2**k for k in range(1, 7))
 GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
 ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contact patches are shorter than a cell
 ORDER_OF_STEPS = 1.0  # order of convergence of backward Euler
-ROUNDING = 1e-12  # relative error of a sum over some thousand nodes
+ROUNDING = 1e-12  # relative rounding error of a sum over several thousand nodes
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ def solve(
     found = _on_grid(line, cases, request, grid, None)
     errors = np.full((4, loads.size), np.inf)
     if request.with_errors:
-        # backward Euler converges too slowly for an error estimate from two grids
+        # on this grid, backward Euler is too far from convergence for an estimate from two grids, and one node per
+        # Nyquist point has no coarser grid; the errors are therefore the differences from an accurate solution
         exact, errors = solve(line, None, *cases, Request(request.accuracy, contact=request.contact))
         errors = np.abs(found.columns - exact.columns) + errors
         errors[np.isnan(errors)] = np.inf

@@ -279,7 +279,7 @@ def solve_sliding(
             step[terms] = max((strain_area - totals[1]) / product[terms], -0.5 * unknown[terms])
         largest = 0.0
         for j in range(size):
-            # an error of the stretch of a soft Prony term hardly matters
+            # an error in the stretch of a soft Prony term hardly matters
             weight = min(1.0, moduli[j]) if j < terms else 1.0
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]

@@ -163,7 +163,7 @@ def _next_contact(
 class Passage(NamedTuple):
     """The results of a sweep.
 
-    `lengths` contains alternately the lengths of free recoveries and of contacts. The first entry is the length of a
+    `lengths` alternately contains the lengths of free recoveries and of contacts. The first entry is the length of a
     free recovery and may be 0. For n nodes, the array `lengths` needs at least 2 n + 2 entries. `imbalance` contains
     the integral of each e_m over the line, which is 0 in the steady state on a periodic line. The six entries of
     `totals` are: integral of u; integral of the stress; integral of the stress times the slope; length in contact;

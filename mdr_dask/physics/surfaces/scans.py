@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BEND = 3.0  # prior standard deviation of the change of the slope d log C2D / d log q between adjacent bins
-STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value, far above that of roughness (by trial)
+STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value, far above that of roughness; by trial
 
 
 class Cut(NamedTuple):
@@ -90,9 +90,9 @@ def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
 
     The standard errors are large below the roll-off, where C2D hardly influences the cut.
 
-    C2D, a power law between adjacent wave numbers of the cut, is found by a least-squares fit. The fit amplifies noise
-    less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the slope d log C2D /
-    d log q from bin to bin has a normal prior with the standard deviation `BEND`.
+    C2D is assumed to be a power law between adjacent wave numbers of the cut, and is fitted by least squares. The fit
+    amplifies noise less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the
+    slope d log C2D / d log q from bin to bin has a normal prior with the standard deviation `BEND`.
     """
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:

@@ -72,7 +72,10 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """Depth and rate at `count` instants. `stiff` is the derivative of the last rate with respect to the last depth."""
+    """The depth and its rate of change at the first `count` instants of the arrays.
+
+    `stiff` is the derivative of the last rate with respect to the last depth.
+    """
 
     time: FloatArray
     depth: FloatArray

@@ -191,7 +191,8 @@ def _begun(
 def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntArray, FloatArray]:
     """Return the first and the last node of each run of cells where contact is possible at depths from `low` to `high`.
 
-    Also return, for each cell, the largest depth at which the cell is certainly out of contact.
+    A run also contains the neighbouring cell on each side. Also return, for each cell, the largest depth at which the
+    cell is certainly out of contact.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)

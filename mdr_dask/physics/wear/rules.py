@@ -29,8 +29,9 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-#: Each piece of integration ends this many times farther from the stick border than the piece before (by trial).
-#: Beyond 900 widths of the first piece, the logistic law deviates from its limit by less than 1/900.
+#: Each piece of integration ends this many times farther from the stick border than the piece before (chosen by trial).
+#: The third piece ends 900 widths of the first piece from the stick border. There, y of the logistic law differs from
+#: its limit 1 by about 1/900.
 LAYER_GROWTH = 30.0
 ERROR = 2e-6  # numerical error of every output, divided by its largest value; without the error of the fast rule itself
 

@@ -184,8 +184,8 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
 MOST_STEPS = 400_000  # largest number of time steps in one piece of a history
 # CELLS and PART are divided by the number of steps per decade
 CELLS = 6.0  # largest number of cells that the line travels in a time step
-# largest time step, as a fraction of the duration of a ramp or of the period of an oscillation; the first time step is
-# the same fraction of the longest time step or of the unit of time, whichever is smaller
+# A time step is at most this fraction of the duration of a ramp, or of the period of an oscillation. The first time
+# step is this fraction of the longest step, or of the unit of time if that is shorter.
 PART = 0.12
 
 
