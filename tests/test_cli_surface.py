@@ -77,7 +77,7 @@ def test_a_scan_is_recognised_by_its_two_columns(folder, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["road0.npy"], "road0.npy: the file does not state its spacing: give --spacing, such as 1 um"),
+        (["road0.npy"], "road0.npy: does not state its spacing: give --spacing, such as 1 um"),
         (["road0.npy", "--spacing", "2 s"], "expected a length"),
         ([*MAPS, "--shortest-wavelength", "1um"], "expected shortest_wavelength of at least"),
         ([*MAPS, "--plot", "road.gif"], "expected a file that ends in"),
