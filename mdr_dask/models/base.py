@@ -178,8 +178,6 @@ class Output:
     * `comment`: a limitation of the output, stored as its attribute ``comment``.
     * `scatter`: name of another output, which contains the standard error of the output, estimated within each
     realisation. If errors are stored, this standard error is stored, too.
-    * `floor`: a value in the unit of the output, for an output that can be zero. If the absolute value of the output is
-    below `floor`, the relative error is the absolute error divided by `floor`.
     * `allow_nan`: whether NaN and infinite values are valid. If `allow_nan` is False, a case of a user's own model
     fails if this output is NaN or infinite.
     """
@@ -192,7 +190,6 @@ class Output:
     has_error: bool = False
     comment: str = ""
     scatter: str = ""
-    floor: float = 0.0
     allow_nan: bool = False
 
     @property
@@ -237,8 +234,8 @@ class Block(Generic[P]):
     with one value in SI units for each case.
     * `realisations`: indices of the realisations. All random numbers of a realisation follow from its index and `seed`.
     * `outputs`: names of the arrays to compute, including the companions that hold errors.
-    * `accuracy`: largest allowed relative discretisation error of every output with `has_error`. `Output.floor` defines
-    the relative error of small values.
+    * `accuracy`: largest allowed relative discretisation error of every output with `has_error`. If the output can be
+    zero, the model may divide the errors of small values by a fixed size instead of the output.
     """
 
     parameters: P
