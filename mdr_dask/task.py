@@ -88,7 +88,7 @@ def run_block(work: Work) -> Outcome:
     started = time.perf_counter()
     if (work.wanted | work.spared).all():
         shape = work.wanted.shape
-        values, status = _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
+        values, status = model.empty_arrays(work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
     else:
         values, status = store.read_block(work.place, work.block.outputs)
     status[work.spared] = Status.NOT_NEEDED
@@ -139,7 +139,7 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
         if is_single:
             message = reason(error) + (where(error) if is_own else "")
             status = np.full((1, 1), Status.FAILED, dtype=np.int8)
-            return Result(_unknown(model, block, (1, 1)), status, {(0, 0): message})
+            return Result(model.empty_arrays(block, (1, 1)), status, {(0, 0): message})
     parts = [
         _compute(model, block.part(case, number), is_own)
         for case in range(block.cases)
@@ -156,7 +156,7 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")
     shape = block.cases, len(block.realisations)
-    unknown, values = _unknown(model, block, shape), {}
+    unknown, values = model.empty_arrays(block, shape), {}
     status, messages = np.array(result.status), dict(result.messages)
     if status.shape != shape or not np.isin(status, (Status.DONE, Status.NOT_CONVERGED, Status.FAILED)).all():
         raise ValueError(f"status: expected DONE, NOT_CONVERGED or FAILED in shape {shape}, got {status}")
@@ -188,13 +188,6 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     for array in values.values():
         array[status == Status.FAILED] = np.nan
     return replace(result, values=values)
-
-
-def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
-    """Return arrays of NaN in the shapes of the outputs."""
-    extra = model.coordinates(block.parameters)
-    sizes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
-    return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
 
 
 def _join(block: Block[Any], parts: list[Result]) -> Result:

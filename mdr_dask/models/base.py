@@ -353,6 +353,13 @@ class Model(Generic[P]):
         """Return the output or the companion that is called `name`. Raise KeyError if there is none."""
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
+    def empty_arrays(self, block: Block[P], shape: tuple[int, ...]) -> dict[str, FloatArray]:
+        """Return an array of NaN for each requested output. `shape` is the shape of an output without dimensions."""
+        sizes = {name: coordinate.values.size for name, coordinate in self.coordinates(block.parameters).items()}
+        return {
+            name: np.full((*shape, *(sizes[dim] for dim in self.output(name).dims)), np.nan) for name in block.outputs
+        }
+
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
         """Return `names` and the names of their `scatter` outputs.
 

@@ -106,10 +106,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
     parameters, contacts = _groups(block), _line_contacts(block)
     formulas = {"formula_central_film": PAN_HAMROCK_CENTRAL, "formula_minimum_film": PAN_HAMROCK_MINIMUM}
     shape = (block.cases, len(block.realisations))
-    lengths = {"position": block.parameters.profile_points}
-    values = {
-        name: np.full(shape + tuple(lengths[dim] for dim in MODEL.output(name).dims), np.nan) for name in block.outputs
-    }
+    values = MODEL.empty_arrays(block, shape)
     for name in formulas.keys() & values.keys():
         values[name][:] = formulas[name](*parameters)[:, None]
     result = Result(values, np.full(shape, Status.DONE, dtype=np.int8))

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.mixed_lubrication.declaration import DRAWN, MODEL, WAVES, MixedLubrication, coordinates
+from mdr_dask.models.mixed_lubrication.declaration import DRAWN, MODEL, WAVES, MixedLubrication
 from mdr_dask.models.mixed_lubrication.lines import LEAST_PER_WAVE, Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.revolution import WINDOWS, Revolution, drawn, revolve, values
@@ -38,12 +38,8 @@ def compute(block: Block[MixedLubrication]) -> Result:
     In each realisation, cases that differ only in load, speed, temperature, rms height or boundary layer have the same
     lines.
     """
-    sizes = {name: coordinate.values.size for name, coordinate in coordinates(block.parameters).items()}
     shape = (block.cases, len(block.realisations))
-    arrays = {
-        name: np.full((*shape, *(sizes[dim] for dim in MODEL.output(name).dims)), np.nan) for name in block.outputs
-    }
-    result = Result(arrays, np.full(shape, Status.MISSING, dtype=np.int8))
+    result = Result(MODEL.empty_arrays(block, shape), np.full(shape, Status.MISSING, dtype=np.int8))
     groups: dict[Source, list[tuple[int, Operation]]] = {}
     for index in range(block.cases):
         case = block.case(index)

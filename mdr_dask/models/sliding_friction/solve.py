@@ -13,7 +13,7 @@ from mdr_dask.models.parts.accuracy import ACCURACY, missed_accuracy
 from mdr_dask.models.parts.material import fit_error
 from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.parts.tested_range import beyond_tested
-from mdr_dask.models.sliding_friction.declaration import SlidingFriction
+from mdr_dask.models.sliding_friction.declaration import MODEL, SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.cases import COLUMNS, Steady
 from mdr_dask.physics.sliding.problem import Request, solve
@@ -30,8 +30,7 @@ OUTPUTS = dict(
 def compute(block: Block[SlidingFriction]) -> Result:
     """Solve the cases of a block. In each realisation, cases with equal dimensionless numbers are solved only once."""
     shape = (block.cases, len(block.realisations))
-    values = {name: np.full(shape, np.nan) for name in block.outputs}
-    result = Result(values, np.full(shape, Status.FAILED, np.int8))
+    result = Result(MODEL.empty_arrays(block, shape), np.full(shape, Status.FAILED, np.int8))
     problems = sliding_problems(block)
     solves = 0
     groups = [_Group(block, problems, *group) for group in _groups(block, problems)]
@@ -44,7 +43,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
     if "material_error" in block.outputs:
         materials, which = each(block, "material")
         errors = np.array([fit_error(material) for material in materials])
-        values["material_error"][:] = np.where(result.status == Status.DONE, errors[which, None], np.nan)
+        result.values["material_error"][:] = np.where(result.status == Status.DONE, errors[which, None], np.nan)
     result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
     return replace(result, solves=solves)
 

@@ -31,7 +31,7 @@ from mdr_dask.models.parts.sliding_problem import (
     sliding_problems,
 )
 from mdr_dask.models.parts.tested_range import beyond_tested
-from mdr_dask.models.velocity_jump.declaration import VelocityJump
+from mdr_dask.models.velocity_jump.declaration import MODEL, VelocityJump
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution, refine
 from mdr_dask.physics.surfaces.cubic_line import without_kinks
@@ -73,10 +73,8 @@ class _Found:
 
 def compute(block: Block[VelocityJump]) -> Result:
     """Solve the cases of a block."""
-    shape, times = (block.cases, len(block.realisations)), (len(block.parameters.relaxation_times),)
-    vectors = {name + error for name in TRANSIENT for error in ("", "_error")}
-    values = {name: np.full(shape + (times if name in vectors else ()), np.nan) for name in block.outputs}
-    result = Result(values, np.full(shape, Status.FAILED, np.int8))
+    shape = (block.cases, len(block.realisations))
+    result = Result(MODEL.empty_arrays(block, shape), np.full(shape, Status.FAILED, np.int8))
     problems, solves = sliding_problems(block), 0
     with np.errstate(all="ignore"):
         after = np.abs(1 + block.numbers("velocity_change"))
