@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, random_stream
 from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table, profile_columns
@@ -73,12 +73,8 @@ def has_tables(block: Block[FrettingWear]) -> bool:
 
 def _scatter(block: Block[FrettingWear]) -> FloatArray:
     """Return standard normal random numbers for friction, amplitude and wear coefficient, shape (realisations, 3)."""
-    return np.array(
-        [
-            np.random.Generator(np.random.Philox(np.random.SeedSequence(block.seed, spawn_key=(r,)))).standard_normal(3)
-            for r in block.realisations
-        ]
-    ).reshape(-1, 3)
+    numbers = [random_stream(block.seed, realisation).standard_normal(3) for realisation in block.realisations]
+    return np.array(numbers).reshape(-1, 3)
 
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, random_stream
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
 from mdr_dask.units import shown
@@ -140,7 +140,7 @@ class Measured:
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
-        stream = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
+        stream = random_stream(seed, realisation)
         offset, start = (int(stream.integers(self.points[-1])) for _ in range(2))
         rings = zip(self._pair(), (start, start + offset), strict=True)
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
