@@ -78,9 +78,9 @@ def _warn_once(problem: str) -> None:
 
 
 @jit_inline
-def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the last index in [low, high) where the ascending array `values` is <= x, or `low` if there is none."""
-    length = high - low
+def last_until(values: Any, x: float, count: int) -> int:
+    """Return the last index below `count` where the ascending array `values` is <= x, or 0 if there is none."""
+    low, length = 0, count
     while length > 1:  # the compiled loop has no branches that a processor could predict wrongly
         half = length // 2
         if values[low + half] <= x:

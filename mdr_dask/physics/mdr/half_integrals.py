@@ -141,7 +141,7 @@ def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order
-    panel = last_until(mesh.edges, place, 0, mesh.edges.size - 1)
+    panel = last_until(mesh.edges, place, mesh.edges.size - 1)
     above, below = 0.0, 0.0
     for member in range(0 if panel > 0 else 1, order + 1):
         node = panel * order + member - 1

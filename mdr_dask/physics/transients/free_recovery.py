@@ -115,7 +115,7 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     last = history.count - 1
     if last <= 0 or t >= history.time[last]:
         return history.depth[last], history.rate[last], 0.0
-    low = last_until(history.time, t, 0, last)
+    low = last_until(history.time, t, last)
     high = low + 1
     step = history.time[high] - history.time[low]
     y = (t - history.time[low]) / step
@@ -224,7 +224,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     If the displacement is at most `least`, the two returned values may be 0.
     """
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
-    low = last_until(first.start, s, 0, first.start.size)
+    low = last_until(first.start, s, first.start.size)
     if s <= first.end[low]:
         h, slope, _ = height_at(now.track, s)
         return (first.depth + h) * now.left, slope * now.left

@@ -83,7 +83,7 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
         if starts_as_parabola:
             slope[0] = 2 * first - slope[1]
         for i in range(places.size):
-            k = last_until(x, places[i], 0, x.size - 1)
+            k = last_until(x, places[i], x.size - 1)
             length, rise = x[k + 1] - x[k], row[k + 1] - row[k]
             t, begin, end = (places[i] - x[k]) / length, length * slope[k], length * slope[k + 1]
             curves[r, i] = row[k] + t * (begin + t * (3 * rise - 2 * begin - end + t * (begin + end - 2 * rise)))
