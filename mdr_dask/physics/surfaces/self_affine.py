@@ -32,7 +32,6 @@ class SelfAffine(NamedTuple):
     hurst: Interval
     longest: Interval | None
     shortest: Interval | None
-    misfit: float  # rms deviation of log C2D from the law, divided by the standard errors
 
 
 def noise_limit(bins: Cut, roughness: float = -2.0, decades: float = 0.3) -> float:
@@ -60,9 +59,9 @@ def steep_limit(bins: Cut) -> float:
     x, y = np.log(wavenumber[there]), np.log(density[there])
     steep = np.diff(y) < STEEPEST * np.diff(x)
     ends = np.flatnonzero(steep & np.append(steep[1:], True))
-    if not np.all(there):
-        return float(wavenumber[there][ends[0]]) if ends.size else float(wavenumber[there][-1])
-    return float(wavenumber[there][ends[0]]) if ends.size else np.inf
+    if ends.size:
+        return float(wavenumber[there][ends[0]])
+    return np.inf if np.all(there) else float(wavenumber[there][-1])
 
 
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
@@ -117,7 +116,6 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
         Interval(-1 - best.slope / 2, low, high),
         wavelength(first, 0) if first else None,
         wavelength(end, 1) if end < last else None,
-        float(np.sqrt(best.chi_squared / x.size)),
     )
 
 

@@ -97,12 +97,6 @@ class Spectrum:
                 density.insert(place, self.density[[index]] * (end / last) ** slope)
         return Spectrum(np.concatenate(q), np.concatenate(density))
 
-    def cut(self, wavenumber: ArrayLike) -> FloatArray:
-        """Return the spectrum of a straight profile, m^3: 2 int C2D(sqrt(q^2 + u^2)) du from 0 to infinity."""
-        k, weight = quadrature(np.asarray(wavenumber, dtype=np.float64), self.wavenumber)
-        cut: FloatArray = np.sum(weight * self.at(k), axis=1)
-        return cut
-
     def rms_height(self) -> float:
         """Return the rms height, m (thesis 2.21)."""
         return math.sqrt(2 * np.pi * self._moment(1))

@@ -126,7 +126,6 @@ def test_both_bends_of_a_spectrum_are_found_where_they_are(longest, shortest):
     density = density * np.exp(0.1 * np.random.default_rng(3).standard_normal(41))
     found = fit_self_affine(Cut(wavenumber, density, np.full(41, 0.1)))
     assert found.hurst.low < 0.7 < found.hurst.high
-    assert 0.5 < found.misfit < 1.5
     for bend, true in ((found.longest, longest), (found.shortest, shortest)):
         if true is None:
             assert bend is None
