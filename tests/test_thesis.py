@@ -58,7 +58,8 @@ def test_every_row_has_a_word_of_the_scale_and_a_command_that_exists():
         judge = JUDGES.get(claim)
         for campaign, law in re.findall(r"mdr-dask fit results/(\w+)\.zarr (\w+)", command):
             assert law in fits.available(model_of(campaign))
-            assert not isinstance(judge, FromFit) or (judge.campaign, judge.law) == (campaign, law)
+            if isinstance(judge, FromFit):
+                assert (judge.campaign, judge.law) == (campaign, law)
 
 
 def test_every_claim_that_is_tested_has_one_row():

@@ -48,4 +48,5 @@ def test_nothing_that_lifts_off_counts_as_full_contact(terms, seed):
         steady, errors = problem.solve(line, pairs, deborah, np.array([share * least]), Request(accuracy=0.05))
         assert steady.status[0] == Outcome.CONVERGED
         closed = errors[0][0] <= 1e-11 * steady.drag[0]
-        assert closed == (share > 2.0) or (1.0 < share < 2.0)
+        if share != 1.5:  # at this load, the solver finds full contact on some lines only
+            assert closed == (share > 2.0)
