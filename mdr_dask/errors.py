@@ -96,3 +96,8 @@ def similar(word: Any, known: Sequence[str]) -> str:
         name for name in folded if len(typed) > 2 and typed in name
     ]
     return f" (did you mean {folded[near[0]]!r}?)" if near else ""
+
+
+def with_digits(number: float, digits: int) -> str:
+    """Return a number with `digits` digits. Only numbers below 1e-4 and numbers of at least 1e10 have an exponent."""
+    return f"{float(f'{number:.{digits}g}'):.10g}"

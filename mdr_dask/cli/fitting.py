@@ -18,12 +18,12 @@ from mdr_dask.cli.options import (
     tell,
 )
 from mdr_dask.cli.printing import (
+    cell,
     print_aligned,
     print_json,
     print_named,
     print_rows,
     say,
-    short,
     table,
     titled,
     with_intervals,
@@ -129,7 +129,7 @@ def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
     ends = {name + end for name in constants for end in _ENDS.values()}
     for name in (name for name in units if name not in ends):
         unit = "" if units[name] == "1" else f" {units[name]}"
-        say(f"{name}: {short(row[name])}{unit}")
+        say(f"{name}: {cell(row[name])}{unit}")
 
 
 _ENDS = {"value": "", "95 % from": "_low", "to": "_high", "68 % from": "_low_68", "68 % to": "_high_68"}

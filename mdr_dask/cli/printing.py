@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdr_dask.errors import with_digits
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -79,7 +81,7 @@ def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys:
     are named in a line that begins with `note`.
     """
     rows = len(columns[0]) if columns else 0
-    cells = [[short(value) for value in column] for column in columns]
+    cells = [[cell(value) for value in column] for column in columns]
     if rows > 1:
         same = [all(cell == column[0] for cell in column) for column in cells]
         named = zip(titles, cells, same, strict=True)
@@ -227,17 +229,17 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
     if math.isnan(value):
         return "not determined"
     if not (math.isfinite(low) and math.isfinite(high)):
-        return short(value)
-    return f"{_number(value, 4)} ({_number(low, 4)}, {_number(high, 4)})"
+        return cell(value)
+    return f"{with_digits(value, 4)} ({with_digits(low, 4)}, {with_digits(high, 4)})"
 
 
 def with_error(mean: float, *errors: float | None) -> str:
     """Join a mean and its errors. An unknown error becomes ``?``, and a rounding error becomes 0."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
-        return short(mean)
+        return cell(mean)
     known = [error if error is not None and math.isfinite(error) else None for error in errors]
-    shown = ["?" if each is None else "0" if is_rounding(each, mean) else _number(each, 1) for each in known]
-    return " +- ".join([_number(mean, 4), *shown])
+    shown = ["?" if each is None else "0" if is_rounding(each, mean) else with_digits(each, 1) for each in known]
+    return " +- ".join([with_digits(mean, 4), *shown])
 
 
 def is_rounding(error: float, mean: float) -> bool:
@@ -245,12 +247,7 @@ def is_rounding(error: float, mean: float) -> bool:
     return math.isclose(mean, mean + error)
 
 
-def _number(value: float, digits: int) -> str:
-    """Return a number with `digits` digits. Only numbers below 1e-4 and numbers of at least 1e10 have an exponent."""
-    return f"{float(f'{value:.{digits}g}'):.10g}"
-
-
-def short(value: Any) -> str:
+def cell(value: Any) -> str:
     """Return the text of a cell with the given value, or ``-`` for an unknown value."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return UNKNOWN

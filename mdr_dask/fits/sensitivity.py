@@ -16,6 +16,7 @@ from scipy.stats import t
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
+from mdr_dask.fits.base import short
 
 #: A study has enough points if the half width of the interval of each index is at most this value.
 NARROW = 0.1
@@ -153,6 +154,6 @@ def _advice(result: xr.Dataset) -> str:
         return f"enough points: every interval is narrower than +-{NARROW:g}"
     more = int(np.ceil(cases * ((widest / NARROW) ** 2 - 1)))
     return (
-        f"not enough points: the widest interval is +-{widest:.3g}; about {float(f'{more:.2g}'):g} more cases would "
+        f"not enough points: the widest interval is +-{widest:.3g}; about {short(more)} more cases would "
         f"narrow it to +-{NARROW:g}"
     )

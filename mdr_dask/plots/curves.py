@@ -142,7 +142,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
     bar = None
     if len(parts) > colours.most():
         name = parameters_along(data, others[0])[0]
-        values = labels.shown(name, data[name])
+        values = labels.converted(name, data[name])
         bar = colours.bar(labels.label(name, data[name]), values)
         # small markers, because there are many curves
         looks = [(colours.shade(bar, value), "-", "." if joined else "o") for value in values]

@@ -73,7 +73,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
             panels[0].traces.append(Trace("law", level, STEADY, STEADY, curve.colour, ":"))
         at, *driven = loading_history(VelocityJump.model_validate(curves.parameters_at(case)), last)
         for panel, (key, unit), value in zip(panels[1:], DRIVEN.items(), driven, strict=True):
-            shown = labels.shown(key, xr.DataArray(value, attrs={"units": unit}))
+            shown = labels.converted(key, xr.DataArray(value, attrs={"units": unit}))
             panel.traces.append(Trace("curve", columns(case, x=at, y=shown), **look))
     panels[0].keys = [*one.keys, Key(STEADY, "#808080", ":")] if len(panels[0].traces) > 1 else one.keys
     for panel in panels[1:]:

@@ -11,7 +11,7 @@ import xarray as xr
 
 from mdr_dask import models
 from mdr_dask.campaign.written import written_units
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, with_digits
 from mdr_dask.plots import page
 from mdr_dask.units import PREFIXES, conversion
 
@@ -132,7 +132,7 @@ def meaning(values: xr.DataArray, name: str) -> str:
     return words
 
 
-def shown(name: str, values: xr.DataArray) -> Any:
+def converted(name: str, values: xr.DataArray) -> Any:
     """Return values in the unit of the figures; words remain unchanged."""
     if values.dtype.kind not in "fiu":
         return values.values
@@ -159,15 +159,10 @@ def printed_unit(unit: str) -> str:
 
 def named(name: str, value: xr.DataArray) -> str:
     """Return one value as text for legends and titles: ``$F_N$ = 1.5 N``."""
-    how, number = quantity(name, value), shown(name, value)
-    text = short(float(number)) if value.dtype.kind in "fiu" else str(number[()])
+    how, number = quantity(name, value), converted(name, value)
+    text = with_digits(float(number), 4) if value.dtype.kind in "fiu" else str(number[()])
     symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
     return f"{symbol} = {text} {printed_unit(how.unit)}".strip()
-
-
-def short(number: float) -> str:
-    """Return a number with four digits, such as ``12340``. Numbers of 1e10 or more, or below 1e-4, have an exponent."""
-    return f"{float(f'{number:.4g}'):.10g}"
 
 
 def plain(text: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from mdr_dask.errors import with_digits
 from mdr_dask.fits.curve_tables import is_temperature
 from mdr_dask.plots import colours, curves, labels, page
 from mdr_dask.plots.base import Plot
@@ -65,7 +66,7 @@ def _label(name: str, values: xr.DataArray) -> str:
 
 
 def _text(value: float, values: xr.DataArray) -> str:
-    return f"{labels.short(value)} {labels.printed_unit(values.attrs['units'])}".strip()
+    return f"{with_digits(value, 4)} {labels.printed_unit(values.attrs['units'])}".strip()
 
 
 def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:

@@ -212,7 +212,7 @@ def _places(data: xr.Dataset, name: str) -> xr.DataArray:
     words.
     """
     values = data[name]
-    shown = labels.shown(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
+    shown = labels.converted(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
     return xr.DataArray(shown, dims=values.dims)
 
 
@@ -223,7 +223,7 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
     if first.dtype.kind not in "fiu":
         words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
         return Axis(label, ticks=[*enumerate(words)])
-    every = np.concatenate([np.ravel(labels.shown(name, each)) for each in arrays])
+    every = np.concatenate([np.ravel(labels.converted(name, each)) for each in arrays])
     return Axis(label, log=view.is_log(which, every, labels.quantity(name, first)), quantity=name)
 
 
@@ -349,7 +349,7 @@ def _panel(title: str, families: Sequence[curves.Family], view: View, output: st
         place, value = _places(data, along), curves.mean(data, output)
         shades = data[view.by] if view.by in data.coords and data[view.by].ndim else None
         if shades is not None and shades.dtype.kind in "fiu":
-            points = columns(data, x=place, y=value, value=labels.shown(view.by, shades))
+            points = columns(data, x=place, y=value, value=labels.converted(view.by, shades))
             panel.traces.append(Trace("dots", points, label=curve.label))
             dots = [trace.column("value") for trace in panel.traces if trace.kind == "dots"]
             panel.bar = colours.bar(labels.label(view.by, shades), np.concatenate(dots))
