@@ -29,7 +29,7 @@ TESTED = 3
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
-class Mean(NamedTuple):
+class Means(NamedTuple):
     """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
     # Along the first axis: the means over all realisations, then, for each group of realisations, the means without
@@ -39,7 +39,7 @@ class Mean(NamedTuple):
     error: FloatArray
 
     @classmethod
-    def of(cls, values: FloatArray, done: BoolArray, error: FloatArray | None) -> Mean:
+    def of(cls, values: FloatArray, done: BoolArray, error: FloatArray | None) -> Means:
         """Return the means over the realisations (last axis) of the results that the mask `done` selects."""
         number = np.arange(values.shape[-1]) % min(GROUPS, values.shape[-1])
         kept = [done, *(done & (number != group) for group in range(number.max() + 1))]
@@ -49,7 +49,7 @@ class Mean(NamedTuple):
         size = np.zeros(mean.shape) if error is None else _mean(np.abs(error), done & np.isfinite(error))
         return cls(known, np.nan_to_num(size, nan=0.0))
 
-    def lines(self, cases: tuple[NDArray[np.intp], ...], number: int) -> Mean:
+    def lines(self, cases: tuple[NDArray[np.intp], ...], number: int) -> Means:
         """Return the means of some cases as a table, in which each row is a line along the axis with index `number`.
 
         `cases` is an index of the cases, made by `numpy.ix_`.
@@ -57,7 +57,7 @@ class Mean(NamedTuple):
         groups = np.moveaxis(np.stack([group[cases] for group in self.groups]), number + 1, -1)
         error = np.moveaxis(self.error[cases], number, -1)
         length = error.shape[-1]
-        return Mean(groups.reshape(len(groups), -1, length), error.reshape(-1, length))
+        return Means(groups.reshape(len(groups), -1, length), error.reshape(-1, length))
 
 
 def _mean(values: FloatArray, some: BoolArray) -> FloatArray:
@@ -150,7 +150,7 @@ class _Interval:
     excess: float
 
 
-def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
+def refined(mesh: Mesh, means: Mapping[str, Means]) -> tuple[Mesh, dict[str, int]]:
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
     `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, how many
@@ -196,7 +196,7 @@ def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
     return Mesh(replace(mesh.series, axes=axes), {**mesh.shares, number: shares}, cases)
 
 
-def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
+def _intervals(mesh: Mesh, number: int, means: Mapping[str, Means]) -> Iterator[_Interval]:
     """Yield the untested intervals of an adaptive axis, and those in which interpolation misses a tolerance."""
     refinement = mesh.refinement(number)
     masks = {k: mesh.used(k) for k in mesh.shares}
@@ -222,7 +222,7 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
                 yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))
 
 
-def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
+def _excess(places: FloatArray, levels: IntArray, lines: Means, tolerance: Tolerance) -> FloatArray:
     """Return, for each interval, the largest ratio of interpolation error to tolerance over all rows of `lines`.
 
     If every row has a failed case at one or both ends of the interval, the result is minus infinity.
@@ -251,7 +251,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     realisations and the discretisation errors. The result may be negative.
 
     `places` are the ascending positions along the axis. The level of a position is 0 at the ends of the axis, 1 in the
-    middle, 2 at the quarters, ... `groups` contains the means described in `Mean.groups`, in an array with three axes:
+    middle, 2 at the quarters, ... `groups` contains the means described in `Means.groups`, in an array with three axes:
     group, line and value. `error`, shape (lines, values), contains the discretisation errors of the means.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator

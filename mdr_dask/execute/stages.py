@@ -11,7 +11,7 @@ from mdr_dask.arrays import BoolArray, IntArray
 from mdr_dask.execute.events import Event
 from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
-from mdr_dask.refinement import Mean, Mesh, Stage, refined
+from mdr_dask.refinement import Means, Mesh, Stage, refined
 
 #: For each group and each dimension, the positions that the values of a stage have in the store.
 Places = tuple[Mapping[str, IntArray], ...]
@@ -78,7 +78,7 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
 
 def _means(
     url: str, mesh: Mesh, template: Template, place: Mapping[str, IntArray], realisations: int
-) -> dict[str, Mean]:
+) -> dict[str, Means]:
     """Return the means over realisations of every output that has a tolerance for interpolation."""
     dims, own, name = template.dims[:-1], list(mesh.series.sizes), template.series.name
     cases = np.ix_(*(place[dim] for dim in dims), np.arange(realisations))
@@ -90,5 +90,5 @@ def _means(
         values = store.values(url, name, output)[cases].transpose(order)
         known = output in companions and companions[output].name in template.campaign.outputs
         error = store.values(url, name, companions[output].name)[cases].transpose(order) if known else None
-        found[output] = Mean.of(values, done, error)
+        found[output] = Means.of(values, done, error)
     return found
