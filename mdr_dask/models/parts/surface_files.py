@@ -212,12 +212,12 @@ def _steepness(slope: float) -> tuple[str, ...]:
 @lru_cache(maxsize=64)
 def scanned(scans: ScanFiles, file: DataFile) -> Found:
     """Return the spectrum of the surface from one scan, without waves that are only noise."""
-    from mdr_dask.physics.surfaces.scans import cut_of_lines, of_cut
+    from mdr_dask.physics.surfaces.scans import cut_of_line, of_cut
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
     line = line_of_scan(scans, file)
     with file.in_errors():
-        cut = cut_of_lines([line], scans.window == "hann")
+        cut = cut_of_line(line, scans.window == "hann")
         limit = noise_limit(cut, roughness=-1.0, decades=0.5)
         spectrum, error = of_cut(cut.until(limit))
     remarks = (*scan_of(scans, file).remarks, *doubts_of_line(line, scans.detrend))
@@ -251,7 +251,7 @@ def anisotropic(maps: MapFiles, file: DataFile) -> str:
     rings = levelled_map(maps, file).spectrum
     if maps.direction is not None or rings.anisotropy() <= MOST_ANISOTROPY:
         return ""
-    slopes = " and ".join(f"{np.sqrt(square):.3g}" for square in rings.slopes[:2])
+    slopes = " and ".join(f"{np.sqrt(square):.3g}" for square in rings.slopes)
     return (
         f"{file.name}: expected an isotropic surface, got an anisotropy of {rings.anisotropy():.2f} "
         f"(slopes along x and y {slopes}): give the `direction` of sliding, x or y"
@@ -304,6 +304,6 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
         spectrum = spectrum_of_map(filled(surface), maps.window == "hann")
     if maps.detrend != "parabola":
         remarks = (*remarks, *_form(without_trend(surface, "plane").height, without_trend(surface, "parabola").height))
-    remarks = (*remarks, *_steepness(float(np.sqrt(sum(spectrum.slopes[:2])))))
+    remarks = (*remarks, *_steepness(spectrum.rms_gradient))
     rms, mean = np.sqrt(np.nanmean(height**2)), np.nanmean(np.abs(height))
     return LevelledMap(float(rms), float(mean), spectrum, remarks)

@@ -18,7 +18,7 @@ from mdr_dask.models.parts.surface_files import (
     levelled_map,
     line_of_scan,
 )
-from mdr_dask.physics.surfaces.scans import Cut, averaged, cut_of_lines, hann_window
+from mdr_dask.physics.surfaces.scans import Cut, averaged, cut_of_line, hann_window
 from mdr_dask.physics.surfaces.self_affine import SelfAffine, fit_self_affine, steep_limit
 from mdr_dask.physics.surfaces.waves import waves_of
 
@@ -106,7 +106,7 @@ def _of_map(
 ) -> tuple[Cut, dict[str, tuple[FloatArray, FloatArray]]]:
     levelled = levelled_map(maps, file)
     rings = levelled.spectrum
-    slopes = np.sqrt(rings.slopes[:2])
+    slopes = np.sqrt(rings.slopes)
     row |= {"Sq": levelled.height_rms, "Sa": levelled.height_mean, "rms_gradient": rings.rms_gradient}
     row |= {"slope_x": float(slopes[0]), "slope_y": float(slopes[1]), "anisotropy": rings.anisotropy()}
     row |= {"length": 2 * np.pi / float(rings.wavenumber[0])}
@@ -115,7 +115,7 @@ def _of_map(
 
 def _of_scan(scans: ScanFiles, file: DataFile, row: dict[str, float | str]) -> dict[str, tuple[FloatArray, FloatArray]]:
     line = line_of_scan(scans, file)
-    cut = cut_of_lines([line], scans.window == "hann")
+    cut = cut_of_line(line, scans.window == "hann")
     slope = waves_of(line.height * hann_window(line.height.size)).rms_slope() / line.length
     row |= {"Pq": float(line.height.std()), "slope_x": slope, "length": line.length}
     return {"x": (cut.wavenumber, cut.density)}

@@ -140,10 +140,10 @@ class MapSpectrum:
     divided by the area of the ring, so that rms height and rms gradient are preserved. `count` is the number of waves
     in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves that are
     statistically independent: 1 without a window, less than 1 with a window. `rms_height`, m, is the rms height of the
-    windowed map. `slopes` contains the mean square of the slope along x, the mean square of the slope along y, and the
-    mean product of both slopes. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring,
-    weighted by power. Both means are 0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of
-    straight profiles: first along x, then along y.
+    windowed map. `slopes` contains the mean square of the slope along x and the mean square of the slope along y.
+    `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power. Both means are
+    0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of straight profiles: first along x,
+    then along y.
     """
 
     wavenumber: FloatArray
@@ -151,7 +151,7 @@ class MapSpectrum:
     count: FloatArray
     independent: float
     rms_height: float
-    slopes: tuple[float, float, float]
+    slopes: tuple[float, float]
     angular: NDArray[np.complex128]
     cuts: tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
@@ -253,7 +253,7 @@ def _rings(
     number = np.arange(1, last + 1)
     safe = np.where(total > 0, total, 1.0)
     row, column = np.sum(power, axis=1), np.sum(power, axis=0)
-    slopes = float(row @ q_x**2), float(column @ square_y), float(q_x @ power @ q_y)
+    slopes = float(row @ q_x**2), float(column @ square_y)
     half = points[0] // 2
     ahead, back = row[1:half], row[::-1][: half - 1]
     cuts = _cut(ahead + back, size[0]), _cut(column[1 : (points[1] + 1) // 2], size[1])

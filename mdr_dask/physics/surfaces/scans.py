@@ -6,8 +6,6 @@ spectrum of the surface. The line of the MDR has a larger spectrum, pi q C2D.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,23 +36,18 @@ class Cut(NamedTuple):
         return Cut(*(column[kept] for column in self))
 
 
-def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
-    """Return the spectrum of detrended scans of equal length and spacing, averaged in logarithmic bins.
+def cut_of_line(line: MeasuredLine, hann: bool = True) -> Cut:
+    """Return the spectrum of a detrended scan, averaged in logarithmic bins.
 
     The Hann window, if used, is normalised so that <h^2> is preserved.
     """
-    points, length = lines[0].height.size, lines[0].length
-    if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
-        raise DataError(
-            "expected scans of equal length with equal numbers of points: describe other scans as separate surfaces"
-        )
-    height = np.array([line.height - line.height.mean() for line in lines])
+    points, length = line.height.size, line.length
     window = hann_window(points) if hann else np.ones(points)
-    power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
-    waves = np.arange(1, power.size + 1)
+    waves = np.fft.rfft((line.height - line.height.mean()) * window) / points
+    power = length / (2 * np.pi) * np.abs(waves[1:]) ** 2
     last = (points - 1) // 2  # without the wave that is two spacings long, whose phase is unknown
-    independent = len(lines) / float(np.mean(window**4))  # because of the window, adjacent waves are correlated
-    return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
+    independent = 1 / float(np.mean(window**4))  # because of the window, adjacent waves are correlated
+    return averaged(2 * np.pi / length * np.arange(1, last + 1, dtype=np.float64), power[:last], independent)
 
 
 def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
