@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
-from mdr_dask.models.mixed_lubrication.lines import MOST_POINTS, Generated, Measured, Source, points_for
+from mdr_dask.models.mixed_lubrication.lines import MOST_POINTS, GeneratedPair, MeasuredPair, Source, points_for
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import STEEL, HertzLine, hertz_line
@@ -165,7 +165,7 @@ class MixedLubrication(Parameters):
         """Return the object that makes the rough lines of the case. Cases with equal objects have the same lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
-            return Measured(one.profile, two.profile, self.rms_roughness is not None)
+            return MeasuredPair(one.profile, two.profile, self.rms_roughness is not None)
         shortest, points = self.shortest_wavelength, self.points
         if shortest == "auto":
             shortest = self.perimeter / (WAVES if points == "auto" else points / 10)
@@ -179,7 +179,7 @@ class MixedLubrication(Parameters):
             grids = (points // 2, points)
         roughness = (one, two) if one is not None and two is not None else self.hurst
         assert roughness is not None
-        return Generated(grids, self.perimeter, self.perimeter / self.longest(), modes, roughness)
+        return GeneratedPair(grids, self.perimeter, self.perimeter / self.longest(), modes, roughness)
 
     def longest(self) -> float:
         """Return the longest wavelength of the roughness in m."""
@@ -232,7 +232,7 @@ class MixedLubrication(Parameters):
 def notes(sets: Sequence[MixedLubrication]) -> tuple[str, ...]:
     """Return notes on measured lines, and a note if the longest wavelength exceeds the largest contact width."""
     pairs = dict.fromkeys(one.source() for one in sets)
-    lines = tuple(pair.note() for pair in pairs if isinstance(pair, Measured))
+    lines = tuple(pair.note() for pair in pairs if isinstance(pair, MeasuredPair))
     longest = max(one.longest() for one in sets)
     width = max(2 * float(one.dry_contact(one.normal_force).half_width) for one in sets)
     if longest <= width * (1 + 1e-9):

@@ -26,7 +26,7 @@ def points_for(modes: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class Generated:
+class GeneratedPair:
     """Two lines with random phases.
 
     If `roughness` is a Hurst exponent, the lines are self-affine with the rms height 1. If `roughness` contains two
@@ -85,7 +85,7 @@ class Generated:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredPair:
     """Two measured lines. The end of each line is joined to its beginning.
 
     If the spacings of the two lines differ, the line with the larger spacing is interpolated to the smaller spacing.
@@ -176,4 +176,4 @@ def _heights_at(file: ProfileFile, spacing: float) -> FloatArray:
     return np.asarray(CubicSpline(place, line.height)(np.arange(0, place[-1], spacing)), dtype=np.float64)
 
 
-Source = Generated | Measured
+Source = GeneratedPair | MeasuredPair
