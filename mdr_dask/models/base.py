@@ -355,10 +355,9 @@ class Model(Generic[P]):
 
     def empty_arrays(self, block: Block[P], shape: tuple[int, ...]) -> dict[str, FloatArray]:
         """Return an array of NaN for each requested output. `shape` is the shape of an output without dimensions."""
-        sizes = {name: coordinate.values.size for name, coordinate in self.coordinates(block.parameters).items()}
-        return {
-            name: np.full((*shape, *(sizes[dim] for dim in self.output(name).dims)), np.nan) for name in block.outputs
-        }
+        along = self.coordinates(block.parameters)
+        sizes = {name: tuple(along[dim].values.size for dim in self.output(name).dims) for name in block.outputs}
+        return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
         """Return `names` and the names of their `scatter` outputs.
