@@ -565,7 +565,13 @@ def read_table(
     of column names, and the table must contain all columns of at least one group. The first complete group is read, and
     columns that belong only to other groups are not used.
     """
-    sheet = read_sheet(text, source)
+    return read_columns(read_sheet(text, source), columns, allow_missing, ways)
+
+
+def read_columns(
+    sheet: Sheet, columns: Sequence[Column], allow_missing: bool = False, ways: Sequence[Sequence[str]] = ()
+) -> Read:
+    """Read the requested columns of a table that was already split into cells, as `read_table` does."""
     meanings = matched(sheet, columns)
     present = {column.name for column, _, _ in meanings if column}
     way = next((way for way in ways if present.issuperset(way)), None)
@@ -581,7 +587,7 @@ def read_table(
     lacking += ["either " + ", or ".join(columns_of)] if way is None and ways else []
     if lacking and not problems:
         got = f", got {listed(unknown)}" if unknown else ""
-        problems = [sheet.head.message(source, f"expected {' and '.join(lacking)}{got}")]
+        problems = [sheet.head.message(sheet.source, f"expected {' and '.join(lacking)}{got}")]
     if problems:
         raise DataError("\n".join(problems))
     by_unit = [

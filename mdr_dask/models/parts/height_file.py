@@ -14,7 +14,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
-from mdr_dask.tables import AGREE, numbers, read_sheet, read_table
+from mdr_dask.tables import AGREE, numbers, read_columns, read_sheet
 from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
@@ -445,8 +445,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     If the columns have no names, the column whose numbers only rise or only fall contains the positions. A single
     column of numbers contains the heights, whatever text is above the column. The user must then give the spacing.
     """
-    text = file.read_text()
-    sheet = read_sheet(text, file.name)
+    sheet = read_sheet(file.read_text(), file.name)
     columns = (
         Column("x", "m", needed=False, given_unit=units.position),
         Column("z", "m", ("height", "y", "Y", "profile"), given_unit=units.height),
@@ -454,7 +453,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     is_named = any(match(*heading, columns)[0] for heading in zip(sheet.names, sheet.units, strict=False))
     filled = np.flatnonzero(np.any(sheet.cells != "", axis=0))
     if sheet.names and (is_named or filled.size > 1):
-        table = read_table(text, file.name, columns, allow_missing=True)
+        table = read_columns(sheet, columns, allow_missing=True)
         if "x" in table and units.spacing is not None:
             raise DataError(f"{file.name}: the file has positions: leave out `spacing`")
         x, z = table.get("x"), table["z"]
