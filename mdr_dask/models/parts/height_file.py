@@ -15,6 +15,8 @@ from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
 from mdr_dask.tables import AGREE, numbers, read_columns, read_sheet
+from mdr_dask.tables.cells import COMMENT, separator_of, split
+from mdr_dask.tables.numerals import decimal_mark, is_number, with_point
 from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
@@ -345,45 +347,35 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     """Return the numeric rows of a text as a table, and the line index of the first of these rows. Words become NaN."""
     import pandas as pd
 
-    kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
-    sample = kept[len(kept) // 2] if kept else ""
-    separator = next((mark for mark in "\t;" if mark in sample), None)
-    tokens = sample.split()
-    if separator is None and "," in sample and (len(tokens) == 1 or tokens[0].endswith(",")):
-        separator = ","
-    decimal = "," if separator != "," and "," in sample else "."
-    number = re.compile(rf"[+-]?(\d+\{decimal}?\d*|\{decimal}\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
+    kept = [k for k, line in enumerate(lines) if line.strip() and line.lstrip()[0] not in COMMENT]
+    separator = separator_of([lines[k] for k in kept[:: 1 + len(kept) // 20]])  # about 20 lines, to save time
 
-    def is_row(line: str) -> bool:
-        found = [cell for cell in map(str.strip, line.split(separator)) if cell]
-        return bool(found) and 2 * sum(number.fullmatch(cell) is not None for cell in found) > len(found)
+    def is_row(k: int) -> bool:
+        found = [cell for cell in split(lines[k], separator) if cell]
+        return 2 * sum(is_number(cell) or cell.strip("+-").casefold() in ("nan", "inf") for cell in found) > len(found)
 
-    numeric = [k for k, line in enumerate(kept) if is_row(line)] or [0]
-    rows = kept[numeric[0] : numeric[-1] + 1]
-    if separator and all(line.rstrip(" ").endswith(separator) for line in rows):
-        rows = [line.rstrip(" ").removesuffix(separator) for line in rows]
-    width = [len(line.split(separator)) for line in rows]
+    first = next((place for place, k in enumerate(kept) if is_row(k)), 0)
+    last = next((place for place, k in reversed([*enumerate(kept)]) if is_row(k)), first)
+    rows = [split(lines[k], separator) for k in kept[first : last + 1]]
+    if not any(row[-1] for row in rows):  # every line ends in a separator
+        rows = [row[:-1] for row in rows]
+    width = [len(row) for row in rows]
     common = max(set(width), key=width.count, default=0)
     # skip lines of numbers above the table that have fewer or more columns than the table
     start = next((k for k, count in enumerate(width) if count == common), 0)
     odd = next((k for k in range(start, len(width)) if width[k] != common), None)
-    first = lines.index(kept[numeric[0] + start]) if kept else 0
-    text = "\n".join((separator or " ").join(line.split(separator)) for line in rows[start:odd])
-    text = text.replace(decimal, ".")  # pandas converts no decimal commas in a column that also contains words
+    decimal = decimal_mark([cell for row in rows for cell in row if is_number(cell)])
+    if not decimal:
+        raise DataError(f"{file.name}: expected decimal commas or decimal points, got both")
+    text = with_point("\n".join(map("\t".join, rows[start:odd])), decimal)
     try:
-        table = pd.read_csv(
-            io.StringIO(text),
-            sep=separator or r"\s+",
-            header=None,
-            skipinitialspace=True,
-            index_col=False,
-        )
+        table = pd.read_csv(io.StringIO(text), sep="\t", header=None, index_col=False)
     except (ValueError, pd.errors.ParserError) as problem:
         raise DataError(f"{file.name}: expected the same number of heights in every row: {problem}") from None
     if odd is not None:
-        where = f"line {lines.index(rows[odd]) + 1} has {width[odd]}, others {common} (write nan for a missing point)"
+        where = f"line {kept[first + odd] + 1} has {width[odd]}, others {common} (write nan for a missing point)"
         raise DataError(f"{file.name}: expected the same number of heights in every row: {where}")
-    return table.apply(pd.to_numeric, errors="coerce"), first
+    return table.apply(pd.to_numeric, errors="coerce"), kept[first + start] if kept else 0
 
 
 #: Columns of a table in which each row is one point of a map.
