@@ -20,8 +20,6 @@ from mdr_dask.tables.numerals import decimal_mark, is_number, with_point
 from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
 MOST_COLUMNS = 6  # largest number of columns of a table; a text with more columns is a map; chosen by trial
@@ -291,7 +289,7 @@ def _grid_of_text(file: DataFile) -> _Grid:
     if min(cells.shape) < 3:
         rows, columns = cells.shape
         raise DataError(f"{file.name}: expected a map, got {rows} rows of {columns} heights: write a scan as columns")
-    grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated)
+    grid = _without_positions(file, cells, stated)
     if words := int(np.count_nonzero(np.isnan(grid.rows))):
         remark = f"cells without a number count as missing points: {words}"
         return grid._replace(remarks=(*grid.remarks, remark))
@@ -343,8 +341,12 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
     return Units(only.get("height", ""), only.get("position", ""), spacing, spacing_y)
 
 
-def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, and the line index of the first of these rows. Words become NaN."""
+def _block(file: DataFile, lines: list[str]) -> tuple[FloatArray, int]:
+    """Return the numeric rows of a text, and the line index of the first of these rows. Words become NaN.
+
+    The separator and the decimal mark are found as in any table, but pandas converts the numbers, because a map may
+    have millions of them.
+    """
     import pandas as pd
 
     kept = [k for k, line in enumerate(lines) if line.strip() and line.lstrip()[0] not in COMMENT]
@@ -367,15 +369,14 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     decimal = decimal_mark([cell for row in rows for cell in row if is_number(cell)])
     if not decimal:
         raise DataError(f"{file.name}: expected decimal commas or decimal points, got both")
-    text = with_point("\n".join(map("\t".join, rows[start:odd])), decimal)
-    try:
-        table = pd.read_csv(io.StringIO(text), sep="\t", header=None, index_col=False)
-    except (ValueError, pd.errors.ParserError) as problem:
-        raise DataError(f"{file.name}: expected the same number of heights in every row: {problem}") from None
     if odd is not None:
         where = f"line {kept[first + odd] + 1} has {width[odd]}, others {common} (write nan for a missing point)"
         raise DataError(f"{file.name}: expected the same number of heights in every row: {where}")
-    return table.apply(pd.to_numeric, errors="coerce"), kept[first + start] if kept else 0
+    if not rows:
+        raise DataError(f"{file.name}: expected the same number of heights in every row, got no rows")
+    text = with_point("\n".join(map("\t".join, rows[start:])), decimal)
+    table = pd.read_csv(io.StringIO(text), sep="\t", header=None, index_col=False)
+    return table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype="float64"), kept[first + start]
 
 
 #: Columns of a table in which each row is one point of a map.
@@ -386,7 +387,7 @@ COORDINATES = (
 )
 
 
-def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
+def _coordinates(file: DataFile, lines: list[str], first: int, cells: FloatArray) -> tuple[tuple[int, str], ...]:
     """Return the index and the unit of each of the columns x, y and z. Return () if one of these columns is missing.
 
     If the columns have no names, there must be exactly three columns apart from row numbers: x, y and z, in this order.
@@ -402,13 +403,12 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFra
             if column is not None:
                 found.setdefault(column.name, (place, written))
         return tuple(found[name] for name in "xyz") if len(found) == len(COORDINATES) else ()
-    table = cells.to_numpy(dtype="float64")
-    places = [k for k in range(table.shape[1]) if not positions.is_numbered(table[:, k])]
-    has_line = positions.rising(table[:, places].T).any()
+    places = [k for k in range(cells.shape[1]) if not positions.is_numbered(cells[:, k])]
+    has_line = positions.rising(cells[:, places].T).any()
     return tuple((k, "") for k in places) if len(places) == len(COORDINATES) and not has_line else ()
 
 
-def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame, stated: Units) -> _Grid:
+def _scattered(file: DataFile, lines: list[str], first: int, cells: FloatArray, stated: Units) -> _Grid:
     """Return the heights of a table whose rows contain x, y and z.
 
     The rows can be in any order. A grid point without a row is a missing point.
@@ -419,7 +419,7 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
             f"{file.name}: expected a map, or columns x, y and z, got {cells.shape[1]} columns: name the columns "
             "in a header line above the numbers, such as x [mm], y [mm], z [um]"
         )
-    x, y, z = (cells.iloc[:, place].to_numpy(dtype="float64") for place, _ in columns)
+    x, y, z = (cells[:, place] for place, _ in columns)
     units = [unit for _, unit in columns]
     if units[0] and units[1]:
         y = y * (_metre(file, units[1], "x_unit") / _metre(file, units[0], "x_unit"))
