@@ -1,7 +1,7 @@
 """From a grid of cells to a `Sheet`: names and units of the columns, and rows of numbers.
 
-`read_sheet` first finds the lines of numbers, then the head above them (names, units, and labels above groups of
-columns), then temperatures and remarks between and below the numbers.
+`read_sheet` finds, in this order, the columns and the lines with numbers, the head above them, the text between and
+below them, and groups of columns. The functions stand in the same order.
 """
 
 from __future__ import annotations
@@ -60,14 +60,15 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     """
     grid = grid_of(text, source)
     if is_name is None:
-        data, numeric = _lines_of_numbers(grid)
+        numeric = _numeric_columns(grid)
+        data = _lines_of_numbers(grid, numeric)
         head = _head(grid, data, numeric.size)
     else:
         head = _head_of_words(grid, is_name)
         data, numeric = np.ones(len(grid.cells), dtype=bool), grid.number[head.begin :].mean(axis=0) >= 0.5
     rows, stated, remark = _body(grid, head, data, numeric)
     first = grid.lines[rows[0] if head.names is None else head.names]
-    names, units = _names_and_units(grid, head) if head.names is not None else ((), ("",) * numeric.size)
+    names, units = _names_and_units(grid, head, numeric.size)
     _require_even(grid, rows, len(units), numeric, first)
     cells = _with_points(grid, rows)[:, : len(units)]
     sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, remark)
@@ -81,29 +82,36 @@ def read_head(text: str) -> Sheet:
     return read_sheet("\n".join(text.splitlines()[:HEAD_LINES]), "")
 
 
-def _lines_of_numbers(grid: Grid) -> tuple[BoolArray, BoolArray]:
-    """Return masks of the lines and of the columns that contain numbers.
+def _numeric_columns(grid: Grid) -> BoolArray:
+    """Return a mask of the columns with numbers. Its length is the number of cells of most lines with numbers.
 
-    A column is numeric if at least half of the lines with the most frequent number of cells have a number in this
-    column. A line contains numbers if at least half of its filled cells in numeric columns are numbers or marks of
-    missing numbers. A line that begins with a word is text if the word is in a numeric column, or if less than half of
-    the columns are filled. With exactly half of the columns filled, such a line is text if most lines have more cells.
+    A column is numeric if at least half of the lines with this number of cells have a number in this column.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # every line has more words than numbers
-    lengths = Counter(grid.length[mostly].tolist() or [0])
+    if not mostly.any():
+        return np.zeros(0, dtype=bool)
+    lengths = Counter(grid.length[mostly].tolist())
     width = max(lengths, key=lambda each: (lengths[each], each))
-    numeric = np.zeros(width, dtype=bool)
-    if mostly.any():
-        numeric = grid.number[mostly & (grid.length == width), :width].mean(axis=0) >= 0.5
-    wide = np.append(numeric, np.zeros(grid.cells.shape[1] - width, dtype=bool))
+    return np.asarray(grid.number[mostly & (grid.length == width), :width].mean(axis=0) >= 0.5)
+
+
+def _lines_of_numbers(grid: Grid, numeric: BoolArray) -> BoolArray:
+    """Return a mask of the lines with numbers.
+
+    A line contains numbers if at least half of its filled cells in numeric columns are numbers or marks of missing
+    numbers. A line that begins with a word is text if the word is in a numeric column, or if less than half of the
+    columns are filled. With exactly half of the columns filled, such a line is text if most lines have more cells.
+    """
+    width = numeric.size
+    numeric = np.append(numeric, np.zeros(grid.cells.shape[1] - width, dtype=bool))
+    filled, words = (marks[:, numeric].sum(axis=1) for marks in (grid.filled, grid.word))
+    has_numbers = (2 * words <= filled) & grid.number[:, numeric].any(axis=1)
     first = grid.filled.argmax(axis=1)
     begins = np.array([bool(_WORD.match(row[column])) for row, column in zip(grid.cells, first, strict=True)])
     share = 2 * grid.filled.sum(axis=1)
-    is_text = begins & (wide[first] | (share < width) | ((share == width) & (grid.length < width)))
-    filled, words = (marks[:, wide].sum(axis=1) for marks in (grid.filled, grid.word))
-    has_numbers = (2 * words <= filled) & grid.number[:, wide].any(axis=1)
-    return np.asarray((filled > 0) & (has_numbers | (words == 0)) & ~is_text), numeric
+    is_text = begins & (numeric[first] | (share < width) | ((share == width) & (grid.length < width)))
+    return np.asarray((filled > 0) & (has_numbers | (words == 0)) & ~is_text)
 
 
 class _Head(NamedTuple):
@@ -158,8 +166,13 @@ def _head_of_words(grid: Grid, is_name: Callable[[str], bool]) -> _Head:
     return _Head(names, units, None, begin)
 
 
-def _names_and_units(grid: Grid, head: _Head) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names and the units of the columns. A line of units takes precedence over units in the names."""
+def _names_and_units(grid: Grid, head: _Head, width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names and the units of the columns. A line of units takes precedence over units in the names.
+
+    Without a line of names, return no names, and `width` empty units.
+    """
+    if head.names is None:
+        return (), ("",) * width
     parts = [split_unit(name) for name in grid.cells[head.names][: grid.length[head.names]]]
     below = [""] * len(parts) if head.units is None else [cell.strip("[](){}<> ") for cell in grid.cells[head.units]]
     units = (in_degrees(one or own) for one, (_, own) in zip(below, parts, strict=False))
