@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +24,13 @@ AGREE = 0.01
 #: A column name that stands for a common logarithm: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
 
-#: The meaning of a column of a table: its `Column`, its unit, and whether its entries are common logarithms.
-Meaning = tuple[Column | None, str, bool]
+
+class Meaning(NamedTuple):
+    """The meaning of a column of a sheet. `column` is None if none of the expected columns has its name."""
+
+    column: Column | None
+    unit: str
+    is_logarithm: bool
 
 
 class Read(dict[str, FloatArray]):
@@ -72,46 +78,43 @@ def read_columns(
 ) -> Read:
     """Read the requested columns of a table that was already split into cells, as `read_table` does."""
     meanings = matched(sheet, columns)
-    present = {column.name for column, _, _ in meanings if column}
+    present = {each.column.name for each in meanings if each.column}
     way = next((way for way in ways if present.issuperset(way)), None)
     others = {name for each in ways for name in each}.difference(way) if way is not None else set()
     columns = [column for column in columns if column.name not in others]
-    meanings = [(each if each in columns else None, unit, is_logarithm) for each, unit, is_logarithm in meanings]
+    meanings = [each if each.column in columns else each._replace(column=None) for each in meanings]
     absent = [column for column in columns if column.name not in present]
-    read, problems = _converted(sheet, meanings, allow_missing)
-    problems = [*_misspelt(sheet, meanings, absent), *problems]
-    unknown = [name for name, (column, _, _) in zip(sheet.names, meanings, strict=False) if column is None]
+    unknown = [name for name, each in zip(sheet.names, meanings, strict=False) if each.column is None]
+    read, wrong = _converted(sheet, meanings, allow_missing)
     lacking = [f"a column {column.name!r}" for column in absent if column.needed]
-    columns_of = [" and ".join(f"a column {name!r}" for name in each) for each in ways]
-    lacking += ["either " + ", or ".join(columns_of)] if way is None and ways else []
+    if ways and way is None:
+        columns_of = [" and ".join(f"a column {name!r}" for name in each) for each in ways]
+        lacking.append("either " + ", or ".join(columns_of))
+    problems = [*_misspelt(sheet, meanings, absent), *wrong]
     if lacking and not problems:
         got = f", got {listed(unknown)}" if unknown else ""
         problems = [sheet.head.message(sheet.source, f"expected {' and '.join(lacking)}{got}")]
     if problems:
         raise DataError("\n".join(problems))
-    by_unit = [
-        f"{name!r} is taken as {column.name!r}, because of its unit"
-        for name, (column, unit, is_logarithm) in zip(sheet.names, meanings, strict=False)
-        if column and not is_logarithm and match(name, unit, columns)[0] is not column
-    ]
     unused = ", ".join(filter(None, unknown))
-    read.remark = "; ".join(filter(None, (*by_unit, f"not used: {unused}" if unused else "", sheet.remark)))
+    remarks = (*_found_by_unit(sheet, meanings, columns), f"not used: {unused}" if unused else "", sheet.remark)
+    read.remark = "; ".join(filter(None, remarks))
     return read
 
 
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
-    """Return, for each column of the sheet, its `Column`, its unit, and whether its entries are common logarithms.
+    """Return the meaning of each column of the sheet.
 
-    The `Column` is one of `columns`, or None for an unknown column of the sheet. In a sheet without names, `columns`
-    describes the columns of the sheet in order. A needed `Column` that no name in the sheet means is
-    assigned to the unknown column with its dimension, if there is only one such column and only one such `Column`.
+    In a sheet without names, `columns` describes the columns of the sheet in order. A needed `Column` that no name in
+    the sheet means is assigned to the unknown column with its dimension, if there is only one such column and only one
+    such `Column`.
     """
     if not sheet.names:
         count = len(sheet.units)
         if count > len(columns):
             what = f"expected the names of the {count} columns in the first line"
             raise DataError(sheet.head.message(sheet.source, what))
-        return [(column, unit, False) for column, unit in zip(columns, sheet.units, strict=False)]
+        return [Meaning(column, unit, False) for column, unit in zip(columns, sheet.units, strict=False)]
     found = []
     for name, unit in zip(sheet.names, sheet.units, strict=True):
         try:
@@ -123,13 +126,13 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
             inner, own = split_unit(re.sub(r"^\((.*)\)$", r"\1", logarithm[1].strip()))
             column, written = match(inner, unit or own, columns)
         is_logarithm = column is not None and logarithm is not None and not column.holds(name)
-        found.append((column, written, is_logarithm))
-    missing = [column for column in columns if column.needed and column not in [meant for meant, _, _ in found]]
+        found.append(Meaning(column, written, is_logarithm))
+    missing = [column for column in columns if column.needed and column not in [each.column for each in found]]
     for column in missing:
-        places = [place for place, (meant, unit, _) in enumerate(found) if meant is None and fits(unit, column)]
+        places = [place for place, each in enumerate(found) if each.column is None and fits(each.unit, column)]
         alike = [each for each in columns if fits(each.unit, column)]
         if column.unit != "1" and alike == [column] and len(places) == 1:
-            found[places[0]] = column, found[places[0]][1], False
+            found[places[0]] = found[places[0]]._replace(column=column)
     return found
 
 
@@ -140,6 +143,13 @@ def _misspelt(sheet: Sheet, meanings: Sequence[Meaning], absent: Sequence[Column
         hint = "" if column else similar(name, [each.name for each in absent]) or nearest(name, alike)
         if hint:
             yield sheet.head.message(sheet.source, f"unknown column {name!r}{hint}")
+
+
+def _found_by_unit(sheet: Sheet, meanings: Sequence[Meaning], columns: Sequence[Column]) -> Iterator[str]:
+    """Yield a remark for each column that was found by its unit, because its name is not known."""
+    for name, (column, unit, is_logarithm) in zip(sheet.names, meanings, strict=False):
+        if column and not is_logarithm and match(name, unit, columns)[0] is not column:
+            yield f"{name!r} is taken as {column.name!r}, because of its unit"
 
 
 def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -> tuple[Read, list[str]]:
