@@ -20,7 +20,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import is_called, plain, split_unit
 from mdr_dask.tables.cells import BLANKS, NO_ROWS, Cells, Grid, Line, are_units, grid_of
 from mdr_dask.tables.numerals import decimal_mark, decimal_marks, with_point
-from mdr_dask.units import in_degrees, is_unit
+from mdr_dask.units import in_degrees
 
 HEAD_LINES = 100  # larger than the number of lines above the names in the files of instruments, chosen by trial
 
@@ -101,7 +101,7 @@ def _lines_of_numbers(grid: Grid, numeric: BoolArray) -> BoolArray:
 
     A line contains numbers if at least half of its filled cells in numeric columns are numbers or marks of missing
     numbers. A line that begins with a word is text if the word is in a numeric column, or if less than half of the
-    columns are filled. With exactly half of the columns filled, such a line is text if most lines have more cells.
+    columns are filled.
     """
     width = numeric.size
     numeric = np.append(numeric, np.zeros(grid.cells.shape[1] - width, dtype=bool))
@@ -109,8 +109,7 @@ def _lines_of_numbers(grid: Grid, numeric: BoolArray) -> BoolArray:
     has_numbers = (2 * words <= filled) & grid.number[:, numeric].any(axis=1)
     first = grid.filled.argmax(axis=1)
     begins = np.array([bool(_WORD.match(row[column])) for row, column in zip(grid.cells, first, strict=True)])
-    share = 2 * grid.filled.sum(axis=1)
-    is_text = begins & (numeric[first] | (share < width) | ((share == width) & (grid.length < width)))
+    is_text = begins & (numeric[first] | (2 * grid.filled.sum(axis=1) < width))
     return np.asarray((filled > 0) & (has_numbers | (words == 0)) & ~is_text)
 
 
@@ -131,24 +130,20 @@ def _head(grid: Grid, data: BoolArray, width: int) -> _Head:
 
     `data` is a mask of the lines of numbers, and `width` is the number of cells of most of these lines. A candidate is
     a line above the numbers with `width` cells. Without candidates, the last line above the numbers contains the names.
-    If the last candidate contains names with units, there is no line of units. If a candidate below the first consists
-    of units, the candidate above it contains the names. If only the first of several candidates consists of units, the
-    last candidate contains the names. The candidate that remains above the names contains labels of columns.
+    If a candidate below the first consists of units, the candidate above it contains the names. If only the first of
+    several candidates consists of units, the last candidate contains the names. The candidate that remains above the
+    names contains labels of columns.
     """
     full = np.flatnonzero(data & (grid.length == width))
     if not full.size:
         grid.require([len(grid.cells) - 1], NO_ROWS)
     begin = int(full[0])
     above = [row for row in range(begin) if not data[row]]
-    if not above and begin + 2 < data.size and not data[begin + 1]:  # the first numbers are labels of columns
-        above, begin = [begin, begin + 1], begin + 2
     if not above:
         return _Head(None, None, None, begin)
     wide = [row for row in above if grid.length[row] == width] or above[-1:]
     units = next((row for row in wide[:0:-1] if are_units(grid.cells[row])), None)
-    if units != wide[-1] and any(unit and is_unit(unit) for _, unit in map(split_unit, grid.cells[wide[-1]])):
-        units = None
-    elif units is not None:
+    if units is not None:
         wide = wide[: wide.index(units)]
     elif len(wide) > 1 and are_units(grid.cells[wide[-2]]):
         units = wide.pop(-2)
