@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models
-from mdr_dask.campaign import Axis, Campaign, Series, measured
+from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import CampaignError, ModelError
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
@@ -356,7 +356,7 @@ def estimate(campaign: Campaign) -> Estimate:
         bytes=sum(template.bytes for template in layout),
         operations=None if model.operations is None else sum(map(_operations, layout)),
         files=1 + sum(template.files for template in layout) + any(series.name for series in campaign.series),
-        notes=tuple(dict.fromkeys((*notes, *measured.notes(campaign)))),
+        notes=tuple(dict.fromkeys((*notes, *campaign.measured_notes))),
         growth=sum(template.cases * _growth(template.series) for template in layout) / cases,
     )
 

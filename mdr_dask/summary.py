@@ -9,7 +9,6 @@ from typing import Any
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Refinement
 from mdr_dask.campaign.fields import yaml_text
-from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import LISTED
 from mdr_dask.models.base import unit_of
 from mdr_dask.plan import Estimate, estimate
@@ -40,7 +39,6 @@ def summary(campaign: Campaign) -> Summary:
 
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
     """Yield the axes of each series, and the notes and costs of the campaign, line by line."""
-    written = written_units(campaign.text)
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)
         if series.name:
@@ -49,7 +47,7 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
         indent = "    " if series.name else "  "
         for axis in series.axes:
             unit = units.get(axis.path, axis.unit or "1")
-            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit, written.get(axis.name, ''))}"
+            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit, campaign.written_units.get(axis.name, ''))}"
     if defaults := _defaults(campaign):
         yield f"  defaults used: {', '.join(defaults)}"
     yield from (f"  {note}" for note in costs.notes)

@@ -86,6 +86,8 @@ READ = {
     "notes below": ("f [Hz];E' [MPa];T [°C]\n1;2;20\n2;3;20\n\n* limit\nMean;2,5;20\nend of measurement\n",
         DMA, {"storage modulus": 2e6}),
     "no separator, decimal commas": ("velocity [m/s]\n0,5\n0,25\n", (Column("velocity", "m/s"),), {"velocity": 0.5}),
+    "few decimal commas between blanks": ("omega [rad/s] E' [kPa] T [°C]\n10,25 1100,5 20,5\n20,25 2200,5 30,5\n",
+        DMA, {"frequency": 10.25, "storage modulus": 1.1005e6, "temperature": 293.65}),
     "trios": (TRIOS, DMA, {"frequency": 1.0, "storage modulus": 1e7, "temperature": 253.15}),
     "steps with a stated temperature": (STEPS_STATED, DMA, {"storage modulus": 1e6, "temperature": 293.15}),
     "pandas": ("run,freq_hz,temperature_C,G_storage_pa,G_loss_pa,force_dyn_N\ntf_1,1,20,1e6,1e5,3\ntf_1,2,20,2e6,2e5,3\n",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -158,3 +158,7 @@ class Campaign:
     remarks: tuple[str, ...] = ()
     # Table of measured values of an output, for the fit ``calibration``.
     measured: DataFile | None = None
+    # Notes on this table, such as the rows outside the ranges of the study.
+    measured_notes: tuple[str, ...] = ()
+    # Unit of each parameter as written in the campaign file, see `written.units_in`.
+    written_units: Mapping[str, str] = field(default_factory=dict)

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from mdr_dask import models
 from mdr_dask.arrays import SAME, FloatArray
-from mdr_dask.campaign.definition import Campaign, Series
+from mdr_dask.campaign.definition import Series
 from mdr_dask.campaign.document import LARGEST
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, factors, fits, match, nearest, plain
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.numbers import numbers_of
-from mdr_dask.tables import AGREE, Line, Read, Sheet, further, listed, matched, read_sheet, read_table
+from mdr_dask.tables import AGREE, Line, Read, Sheet, further, listed, matched, read_columns, read_sheet
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
@@ -82,7 +82,7 @@ def read_measured(
     headings, unit, is_relative = _error_of(sheet, columns)
     unit_of_errors = "1" if is_relative else outputs[output]
     error = Column(ERROR, unit_of_errors, headings, needed=False, least=0.0, given_unit=unit)
-    read = read_table(text, source, [*columns, error], allow_missing=True)
+    read = read_columns(sheet, [*columns, error], allow_missing=True)
     _require_names(read, source, conditions, axes or {})
     others = [read.headings[name] for name in outputs if name in read and name != output]
     for name in outputs.keys() - {output}:
@@ -185,38 +185,27 @@ def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapp
         raise DataError("\n".join(wrong))
 
 
-def require_readable(table: DataFile, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
-    """Raise DataError if a table is too large, or does not fit any series of a campaign."""
-    size = len(table.read_text())
-    if size > LARGEST:
-        raise DataError(f"{table.name}: expected a table of at most {LARGEST} characters, got {size}")
-    found = [each for _, each in _readings(table, model, outputs, series)]
-    if isinstance(found[0], DataError) and not any(isinstance(each, Measured) for each in found):
-        raise found[0]
+def notes(table: DataFile, model: str, outputs: Sequence[str], series: Sequence[Series]) -> tuple[str, ...]:
+    """Return notes on the measured points of each series, such as its unknowns and the rows outside its ranges.
 
-
-def _readings(
-    table: DataFile | None, model: str, outputs: Sequence[str], series: Sequence[Series]
-) -> Iterator[tuple[Series, Measured | DataError]]:
-    """Yield each series with its measured points, or with the error that explains why the table does not fit."""
-    for one in series if table else ():
-        assert table is not None
+    Raise DataError if the table is too large, or does not fit any series.
+    """
+    text = table.read_text()
+    if len(text) > LARGEST:
+        raise DataError(f"{table.name}: expected a table of at most {LARGEST} characters, got {len(text)}")
+    found, errors = [], []
+    for one in series:
+        before = f"measured {table.name}{f', series {one.name}' if one.name else ''}"
         try:
-            columns = _of_series(model, outputs, one)
-            yield one, read_measured(table.read_text(), table.name, *columns)
+            measured = read_measured(text, table.name, *_of_series(model, outputs, one))
         except DataError as error:
-            yield one, error
-
-
-def notes(campaign: Campaign) -> Iterator[str]:
-    """Yield notes on the measured points of each series, such as its unknowns and the rows outside its ranges."""
-    for series, found in _readings(campaign.measured, campaign.model, campaign.outputs, campaign.series):
-        assert campaign.measured is not None
-        before = f"measured {campaign.measured.name}{f', series {series.name}' if series.name else ''}"
-        if isinstance(found, DataError):
-            yield f"{before}: no measured points belong to this series"
+            errors.append(error)
+            found.append(f"{before}: no measured points belong to this series")
         else:
-            yield from (f"{before}: {sentence}" for sentence in _sentences(found, campaign.model, series))
+            found += [f"{before}: {sentence}" for sentence in _sentences(measured, model, one)]
+    if len(errors) == len(series):
+        raise errors[0]
+    return tuple(found)
 
 
 def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:

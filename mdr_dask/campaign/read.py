@@ -11,11 +11,12 @@ from mdr_dask import models
 from mdr_dask.campaign.definition import Campaign, Replication, Series
 from mdr_dask.campaign.document import TOO_DEEP, Document, parse, read_text
 from mdr_dask.campaign.expand import expand
-from mdr_dask.campaign.measured import require_readable
+from mdr_dask.campaign.measured import notes
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
 from mdr_dask.campaign.tolerances import tolerances
+from mdr_dask.campaign.written import units_in
 from mdr_dask.errors import CampaignError, DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Model
 from mdr_dask.units import to_si
@@ -58,9 +59,10 @@ def _campaign(document: Document, directory: str) -> Campaign:
     replication = _replication(document, spec, model, outputs)
     _check_blocks(document, spec, series)
     measured = spec.measured.table if spec.measured else None
+    measured_notes: tuple[str, ...] = ()
     if measured and series:
         try:
-            require_readable(measured, spec.model, outputs, series)
+            measured_notes = notes(measured, spec.model, outputs, series)
         except DataError as error:
             document.report(("measured", "table"), "; ".join(str(error).splitlines()))
     document.problems.raise_if_any(remarks)
@@ -78,6 +80,8 @@ def _campaign(document: Document, directory: str) -> Campaign:
         source=document.source,
         remarks=remarks,
         measured=measured,
+        measured_notes=measured_notes,
+        written_units=units_in(document.data),
     )
 
 

@@ -18,12 +18,16 @@ from mdr_dask.units import likely, unit_behind
 
 @lru_cache(maxsize=16)
 def written_units(text: str) -> dict[str, str]:
+    """Return `units_in` for the text of a campaign in a store. If the text cannot be read, the result is empty."""
+    data = parse(text, "").data
+    return units_in(data) if isinstance(data, dict) else {}
+
+
+def units_in(data: Mapping[str, Any]) -> dict[str, str]:
     """Return the unit of each parameter whose values have the same unit everywhere in the campaign.
 
-    The keys are names of coordinates, such as ``indenter_radius``. If the text cannot be read, the result is empty.
+    The keys are names of coordinates, such as ``indenter_radius``.
     """
-    whole = parse(text, "").data
-    data = whole if isinstance(whole, dict) else {}
     series = data.get("series")
     found: dict[str, set[str]] = {}
     for parameters in (data.get("parameters"), *(series.values() if isinstance(series, dict) else ())):

@@ -80,8 +80,7 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     caller will read, or 0 for all rows.
     """
     maker = _Maker(dataset, question, tell)
-    units = maker.units()
-    keys = maker.keys
+    units, keys = maker.first_row()
     if question.sort:
         order = maker.order()
         return Table(maker.picked(order[: limit or None]), units, order.size, keys)
@@ -139,15 +138,17 @@ class _Maker:
         own = [str(dim) for dim in self._data.sizes if raw or dim != "realisation"]
         self._dims = [dim for dim in own if dim != "state"]
         self.sizes = {dim: self._data.sizes[dim] for dim in self._dims}
-        self.keys = 0
 
-    def units(self) -> dict[str, str]:
-        """Compute one row, to raise errors in the question at once, and return the units of the columns."""
+    def first_row(self) -> tuple[dict[str, str], int]:
+        """Compute one row, to raise errors in the question at once.
+
+        Return the units of the columns, and the number of columns that identify a row.
+        """
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
-        self.keys = sum(1 for _ in takewhile(lambda name: name in rows.coords, self._names(rows)))
-        return self._frame(rows)[1]
+        keys = sum(1 for _ in takewhile(lambda name: name in rows.coords, self._names(rows)))
+        return self._frame(rows)[1], keys
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
         """Yield frames of about `most` rows, in the order of the axes."""
@@ -200,12 +201,12 @@ class _Maker:
         return adaptive and not (self._raw or self._question.group_by)
 
     def _kept(self, rows: xr.Dataset) -> Any:
-        needed = np.ones(rows.sizes["row"], dtype=bool)
+        kept = np.ones(rows.sizes["row"], dtype=bool)
         if STATUS in rows and "realisation" in rows[STATUS].dims:
-            needed &= ~(rows[STATUS] == Status.NOT_NEEDED).all("realisation").to_numpy()
+            kept &= ~(rows[STATUS] == Status.NOT_NEEDED).all("realisation").to_numpy()
         if not self._question.where or self._question.group_by:
-            return needed
-        return needed & np.broadcast_to(Columns(rows).truth(self._question.where).to_numpy(), rows.sizes["row"])
+            return kept
+        return kept & np.broadcast_to(Columns(rows).truth(self._question.where).to_numpy(), rows.sizes["row"])
 
     def _keys(self, rows: xr.Dataset) -> list[Any]:
         columns = Columns(rows)

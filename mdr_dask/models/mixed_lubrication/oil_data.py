@@ -14,7 +14,7 @@ from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants
-from mdr_dask.tables import read_sheet, read_table
+from mdr_dask.tables import read_columns, read_sheet
 from mdr_dask.units import converts, shown
 
 _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
@@ -139,12 +139,12 @@ class _Fit(NamedTuple):
 @lru_cache(maxsize=16)
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     """Fit Walther's law to a table of viscosities. Raise DataError if no fit is possible."""
-    text = file.read_text()
-    is_dynamic = any(converts(unit, "Pa s") for unit in read_sheet(text, file.name).units)
+    sheet = read_sheet(file.read_text(), file.name)
+    is_dynamic = any(converts(unit, "Pa s") for unit in sheet.units)
     viscous = Column("dynamic viscosity", "Pa s", above=0)
     if not is_dynamic:
         viscous = Column("kinematic viscosity", "m^2/s", above=0)
-    table = read_table(text, file.name, (Column("temperature", "K", above=0), viscous))
+    table = read_columns(sheet, (Column("temperature", "K", above=0), viscous))
     order = np.argsort(table["temperature"])
     temperature, viscosity = table["temperature"][order], table[viscous.name][order]
     if is_dynamic:

@@ -14,12 +14,12 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
-from mdr_dask.tables import AGREE, numbers, read_sheet, read_table
+from mdr_dask.tables import AGREE, numbers, read_columns, read_sheet
+from mdr_dask.tables.cells import COMMENT, separator_of, split
+from mdr_dask.tables.numerals import decimal_mark, is_number, with_point
 from mdr_dask.units import converts, shown, to_si
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
 MOST_COLUMNS = 6  # largest number of columns of a table; a text with more columns is a map; chosen by trial
@@ -289,7 +289,7 @@ def _grid_of_text(file: DataFile) -> _Grid:
     if min(cells.shape) < 3:
         rows, columns = cells.shape
         raise DataError(f"{file.name}: expected a map, got {rows} rows of {columns} heights: write a scan as columns")
-    grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated)
+    grid = _without_positions(file, cells, stated)
     if words := int(np.count_nonzero(np.isnan(grid.rows))):
         remark = f"cells without a number count as missing points: {words}"
         return grid._replace(remarks=(*grid.remarks, remark))
@@ -341,49 +341,42 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
     return Units(only.get("height", ""), only.get("position", ""), spacing, spacing_y)
 
 
-def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, and the line index of the first of these rows. Words become NaN."""
+def _block(file: DataFile, lines: list[str]) -> tuple[FloatArray, int]:
+    """Return the numeric rows of a text, and the line index of the first of these rows. Words become NaN.
+
+    The separator and the decimal mark are found as in any table, but pandas converts the numbers, because a map may
+    have millions of them.
+    """
     import pandas as pd
 
-    kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
-    sample = kept[len(kept) // 2] if kept else ""
-    separator = next((mark for mark in "\t;" if mark in sample), None)
-    tokens = sample.split()
-    if separator is None and "," in sample and (len(tokens) == 1 or tokens[0].endswith(",")):
-        separator = ","
-    decimal = "," if separator != "," and "," in sample else "."
-    number = re.compile(rf"[+-]?(\d+\{decimal}?\d*|\{decimal}\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
+    kept = [k for k, line in enumerate(lines) if line.strip() and line.lstrip()[0] not in COMMENT]
+    separator = separator_of([lines[k] for k in kept[:: 1 + len(kept) // 20]])  # about 20 lines, to save time
 
-    def is_row(line: str) -> bool:
-        found = [cell for cell in map(str.strip, line.split(separator)) if cell]
-        return bool(found) and 2 * sum(number.fullmatch(cell) is not None for cell in found) > len(found)
+    def is_row(k: int) -> bool:
+        found = [cell for cell in split(lines[k], separator) if cell]
+        return 2 * sum(is_number(cell) or cell.strip("+-").casefold() in ("nan", "inf") for cell in found) > len(found)
 
-    numeric = [k for k, line in enumerate(kept) if is_row(line)] or [0]
-    rows = kept[numeric[0] : numeric[-1] + 1]
-    if separator and all(line.rstrip(" ").endswith(separator) for line in rows):
-        rows = [line.rstrip(" ").removesuffix(separator) for line in rows]
-    width = [len(line.split(separator)) for line in rows]
+    first = next((place for place, k in enumerate(kept) if is_row(k)), 0)
+    last = next((place for place, k in reversed([*enumerate(kept)]) if is_row(k)), first)
+    rows = [split(lines[k], separator) for k in kept[first : last + 1]]
+    if not any(row[-1] for row in rows):  # every line ends in a separator
+        rows = [row[:-1] for row in rows]
+    width = [len(row) for row in rows]
     common = max(set(width), key=width.count, default=0)
     # skip lines of numbers above the table that have fewer or more columns than the table
     start = next((k for k, count in enumerate(width) if count == common), 0)
     odd = next((k for k in range(start, len(width)) if width[k] != common), None)
-    first = lines.index(kept[numeric[0] + start]) if kept else 0
-    text = "\n".join((separator or " ").join(line.split(separator)) for line in rows[start:odd])
-    text = text.replace(decimal, ".")  # pandas converts no decimal commas in a column that also contains words
-    try:
-        table = pd.read_csv(
-            io.StringIO(text),
-            sep=separator or r"\s+",
-            header=None,
-            skipinitialspace=True,
-            index_col=False,
-        )
-    except (ValueError, pd.errors.ParserError) as problem:
-        raise DataError(f"{file.name}: expected the same number of heights in every row: {problem}") from None
+    decimal = decimal_mark([cell for row in rows for cell in row if is_number(cell)])
+    if not decimal:
+        raise DataError(f"{file.name}: expected decimal commas or decimal points, got both")
     if odd is not None:
-        where = f"line {lines.index(rows[odd]) + 1} has {width[odd]}, others {common} (write nan for a missing point)"
+        where = f"line {kept[first + odd] + 1} has {width[odd]}, others {common} (write nan for a missing point)"
         raise DataError(f"{file.name}: expected the same number of heights in every row: {where}")
-    return table.apply(pd.to_numeric, errors="coerce"), first
+    if not rows:
+        raise DataError(f"{file.name}: expected the same number of heights in every row, got no rows")
+    text = with_point("\n".join(map("\t".join, rows[start:])), decimal)
+    table = pd.read_csv(io.StringIO(text), sep="\t", header=None, index_col=False)
+    return table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype="float64"), kept[first + start]
 
 
 #: Columns of a table in which each row is one point of a map.
@@ -394,7 +387,7 @@ COORDINATES = (
 )
 
 
-def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
+def _coordinates(file: DataFile, lines: list[str], first: int, cells: FloatArray) -> tuple[tuple[int, str], ...]:
     """Return the index and the unit of each of the columns x, y and z. Return () if one of these columns is missing.
 
     If the columns have no names, there must be exactly three columns apart from row numbers: x, y and z, in this order.
@@ -410,13 +403,12 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFra
             if column is not None:
                 found.setdefault(column.name, (place, written))
         return tuple(found[name] for name in "xyz") if len(found) == len(COORDINATES) else ()
-    table = cells.to_numpy(dtype="float64")
-    places = [k for k in range(table.shape[1]) if not positions.is_numbered(table[:, k])]
-    has_line = positions.rising(table[:, places].T).any()
+    places = [k for k in range(cells.shape[1]) if not positions.is_numbered(cells[:, k])]
+    has_line = positions.rising(cells[:, places].T).any()
     return tuple((k, "") for k in places) if len(places) == len(COORDINATES) and not has_line else ()
 
 
-def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame, stated: Units) -> _Grid:
+def _scattered(file: DataFile, lines: list[str], first: int, cells: FloatArray, stated: Units) -> _Grid:
     """Return the heights of a table whose rows contain x, y and z.
 
     The rows can be in any order. A grid point without a row is a missing point.
@@ -427,7 +419,7 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
             f"{file.name}: expected a map, or columns x, y and z, got {cells.shape[1]} columns: name the columns "
             "in a header line above the numbers, such as x [mm], y [mm], z [um]"
         )
-    x, y, z = (cells.iloc[:, place].to_numpy(dtype="float64") for place, _ in columns)
+    x, y, z = (cells[:, place] for place, _ in columns)
     units = [unit for _, unit in columns]
     if units[0] and units[1]:
         y = y * (_metre(file, units[1], "x_unit") / _metre(file, units[0], "x_unit"))
@@ -445,8 +437,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     If the columns have no names, the column whose numbers only rise or only fall contains the positions. A single
     column of numbers contains the heights, whatever text is above the column. The user must then give the spacing.
     """
-    text = file.read_text()
-    sheet = read_sheet(text, file.name)
+    sheet = read_sheet(file.read_text(), file.name)
     columns = (
         Column("x", "m", needed=False, given_unit=units.position),
         Column("z", "m", ("height", "y", "Y", "profile"), given_unit=units.height),
@@ -454,7 +445,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     is_named = any(match(*heading, columns)[0] for heading in zip(sheet.names, sheet.units, strict=False))
     filled = np.flatnonzero(np.any(sheet.cells != "", axis=0))
     if sheet.names and (is_named or filled.size > 1):
-        table = read_table(text, file.name, columns, allow_missing=True)
+        table = read_columns(sheet, columns, allow_missing=True)
         if "x" in table and units.spacing is not None:
             raise DataError(f"{file.name}: the file has positions: leave out `spacing`")
         x, z = table.get("x"), table["z"]
