@@ -108,7 +108,7 @@ def test_a_warning_is_printed_once_for_all_figures(filled, capsys, monkeypatch):
     """Warnings are counted by case: the first and the last message are of two realisations of one case."""
     message = {"series": "", "status": "done", "case": {}, "attempt": 0}
     texts = ["the film is thin: ratio 0.2; the load is high", "the film is thin: ratio 0.3", "the film is thin"]
-    places = ([0, 0], [1, 0], [0, 1])
+    places = ([0, 0, 0], [1, 0, 0], [0, 0, 1])
     found = [message | {"message": text, "place": place} for text, place in zip(texts, places, strict=True)]
     monkeypatch.setattr("mdr_dask.questions.progress.messages", lambda *_: found)
     assert main(["plot", filled, "velocity", "force", "-o", "drawn"]) == 0
@@ -116,6 +116,12 @@ def test_a_warning_is_printed_once_for_all_figures(filled, capsys, monkeypatch):
     assert f"all figures: warning: the film is thin (2 cases of {filled})" in errors
     assert sum("warning: the load is high" in line for line in errors) == 1
     assert "warning: the film is thin" in Path("drawn/small-force.csv").read_text()
+    first, *_ = datasets(filled)[""]["status"].dims
+    chosen = float(datasets(filled)[""][first][1])
+    assert main(["plot", filled, "friction_coefficient", "--select", f"{first}={chosen!r}", "-o", "one.png"]) == 0
+    errors = capsys.readouterr().err
+    assert f"warning: the film is thin (1 case of {filled})" in errors
+    assert "the load is high" not in errors
 
 
 def test_the_look_of_a_figure_needs_a_figure(filled, capsys):

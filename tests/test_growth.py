@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import planted
 import pytest
 import toy
 from hypothesis import HealthCheck, settings
@@ -14,10 +15,12 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from test_execute import digests, run, values
 
 from mdr_dask import execute, store
-from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.campaign import Replication, Tolerance, load
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Progress, Resources
+from mdr_dask.execute.stages import stored_layout
 from mdr_dask.models.base import Status
+from mdr_dask.refinement import Stage
 
 
 def test_values_in_the_middle_of_zipped_axes_are_appended_and_found(toy, url):
@@ -104,6 +107,21 @@ def test_another_campaign_takes_the_place_of_one_that_was_never_laid_out(toy, ur
         store.datasets(url)
     assert run(replace(toy.campaign(toy.axis("slope", [1.0, 2.0])), blocks={"realisation": 4}), url).done == 12
     assert np.isfinite(values(url)).all()
+
+
+def test_a_study_that_was_moved_with_its_files_is_the_same_study(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    planted.make_tables(first)
+    (first / "line 2.csv").write_text((first / "line.csv").read_text() + "20,0\n")
+    lines = "  surface: [{profile: line.csv}, {profile: line 2.csv}]\n  normal_force: 1 N\n  velocity: 1 mm/s\n"
+    rubber = "  material: {dma_table: {file: dma.csv, poisson_ratio: 0.5}}\n"
+    planted.make(first, f"model: sliding_friction\nparameters:\n{lines}{rubber}", realisations=1)
+    shutil.move(first, second)
+    layout, _ = stored_layout(Stage.first(load(second / "study.yaml")), str(second / "study.zarr"))
+    assert store.is_laid_out(str(second / "study.zarr"), layout)
+    assert str(second) in repr(layout)
+    assert str(first) not in repr(layout)
 
 
 def test_files_and_folders_that_are_no_store_are_left_alone(toy, tmp_path):

@@ -61,8 +61,8 @@ def read_measured(
 
     If the table contains several outputs, the output in `wanted` is read. A heading such as ``temperature`` may be
     short for ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An axis without a
-    column is an unknown parameter. DataError is raised if all numbers of an unused column lie in the range of an
-    unknown parameter, because the column may be misnamed.
+    column is an unknown parameter. DataError is raised if an unused column may contain an unknown parameter, because
+    the column may be misnamed.
     """
     sheet = read_sheet(text, source)
     units = {**outputs, **conditions}
@@ -168,18 +168,23 @@ def _short_names(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _require_names(read: Read, source: str, units: Mapping[str, str], axes: Mapping[str, ArrayLike]) -> None:
-    """Raise DataError if the numbers of an unused column lie within the range of an axis that has no column."""
+    """Raise DataError if an unused column may contain the values of an axis that has no column.
+
+    A column that states a unit may contain an axis with this dimension. Pure numbers and numbers without a unit may
+    contain an axis if they lie in the range of this axis.
+    """
     wrong = []
     for axis in [name for name in axes if name not in read]:
         ends = np.asarray(axes[axis], dtype=np.float64)
         low, high = ends.min() - SAME * abs(ends.min()), ends.max() + SAME * abs(ends.max())
         for heading, (unit, numbers) in read.unused.items():
-            if unit and not fits(unit, Column(axis, units[axis])):
+            values = numbers[np.isfinite(numbers)]
+            if not values.size or (unit and not fits(unit, Column(axis, units[axis]))):
                 continue
             before, factor, zero = factors(unit, units[axis])
-            values = before * (numbers[np.isfinite(numbers)] * factor + zero)
-            if values.size and low <= values.min() and values.max() <= high:
-                what = f"column {heading!r} is not used, but its numbers lie in the range of the unknown {axis!r}"
+            values = before * (values * factor + zero)
+            if (unit and units[axis] != "1") or (low <= values.min() and values.max() <= high):
+                what = f"column {heading!r} is not used, but may contain {axis!r}, which has no column"
                 wrong.append(f"{source}: {what}: rename the column to {axis!r}, or delete the column")
     if wrong:
         raise DataError("\n".join(wrong))

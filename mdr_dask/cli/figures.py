@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 #: Options that apply only to figures of outputs, because the axes of a named figure are fixed.
 OF_OUTPUTS = ("over", "by", "panels", "log")
 COMMAND = "mdr_dask.command"
+#: Variable that numbers the results of a series; after a selection, it contains the numbers of the selected results.
+NUMBER = "number of the result"
 
 
 class Drawing(click.Command):
@@ -105,10 +107,11 @@ def plot(
         figures = _requested(names, everything, known, groups, axes)
         places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
         require_known([*units], [str(name) for data in groups.values() for name in data.variables], "quantity")
-        groups = selection.select_all(groups, selections, tell)
+        groups = selection.select_all({key: _numbered(data) for key, data in groups.items()}, selections, tell)
         if where:
             groups = selection.where_all(groups, where)
-        warnings = _warnings(urls)
+        warnings = _warnings(urls, series, groups)
+        groups = {key: data.drop_vars(NUMBER) for key, data in groups.items()}
         if measured is not None:
             from mdr_dask.plots.measured import with_points
 
@@ -133,15 +136,27 @@ def plot(
         tell(f"--units {', '.join(sorted(unused))}: not shown in any figure that was drawn")
 
 
-def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return the different warnings of each store, with the number of cases that have them."""
-    from mdr_dask import store as stores
+def _numbered(data: xr.Dataset) -> xr.Dataset:
+    import numpy as np
+
+    status = data["status"]
+    return data.assign({NUMBER: (status.dims, np.arange(status.size).reshape(status.shape))})
+
+
+def _warnings(urls: Sequence[str], series: Sequence[str], groups: Mapping[str, xr.Dataset]) -> list[str]:
+    """Return the different warnings of the selected results of each store, with the number of cases that have them.
+
+    `groups` are the selected parts of the series, with the variable `NUMBER`.
+    """
     from mdr_dask.questions import progress
 
     found = []
     for url in urls:
-        studies = stores.datasets(url)
-        messages = [message for name, data in studies.items() for message in progress.messages(url, name, data)]
+        messages = []
+        for key, data in _groups(url, urls, series).items():
+            numbers, selected = _numbered(data)[NUMBER].values, {*groups[key][NUMBER].values.ravel().tolist()}
+            every = progress.messages(url, str(data.attrs.get("series", "")), data)
+            messages += [each for each in every if numbers[tuple(each["place"])] in selected]
         warnings = progress.warnings(messages)
         found += [f"{text} ({count} case{'s' * (count > 1)} of {url})" for text, count in warnings.items()]
     return found

@@ -226,7 +226,8 @@ def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
         for name, axis in dataset.coords.items()
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
-    axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim}
+    varied = {axis["name"] for axis in dataset.attrs.get("axes", ())}  # a selection may have left one value of an axis
+    axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim or name in varied}
     return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted)
 
 
@@ -249,7 +250,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     meaning = dataset[measured.output].attrs.get("long_name", measured.output)
     compared = f"{measured.values.size} points, compared with {measured.output}: {meaning}"
     few = {name: dataset[name].to_numpy() for name in measured.conditions if dataset[name].size < FEWEST}
-    compared = "; ".join([compared, *scatter(measured, few)])
+    compared = "; ".join(filter(None, [compared, measured.remark, *scatter(measured, few)]))
     return summary(calibrate(dataset, measured)).assign(measured=((), compared, {"units": "1"}))
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, is_geometric
 from mdr_dask.bootstrap import RESAMPLES
+from mdr_dask.campaign.measured import belonging
 from mdr_dask.errors import FitError
 from mdr_dask.fits import calibration as fit
 from mdr_dask.fits import posterior
@@ -29,9 +30,9 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     unknowns, the density of this product has a panel too.
     """
     found, series, data, left_out = _first(groups)
-    varied = found.measured.conditions
+    varied = _set_values(found, data)
     main = max(varied, key=lambda name: np.unique(varied[name]).size, default="")
-    curves = _curves(found, main, data)
+    curves = _curves(varied, main, found.measured.values.size, data)
     x = Axis("measured point")
     if main:
         x = Axis(labels.label(main, data[main]), is_geometric(varied[main]), quantity=main)
@@ -66,13 +67,19 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
     raise FitError("; ".join(dict.fromkeys(reasons.values())))
 
 
-def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
-    """Divide the measured points into curves: the points of a curve differ only in the condition `main`.
+def _set_values(found: fit.Calibration, data: xr.Dataset) -> dict[str, FloatArray]:
+    """Return the measured conditions. A value that belongs to a value of the study is replaced by this value."""
+    near = {name: belonging(each, data[name]) for name, each in found.measured.conditions.items()}
+    return {name: np.where(np.isnan(each), found.measured.conditions[name], each) for name, each in near.items()}
+
+
+def _curves(varied: Mapping[str, FloatArray], main: str, count: int, data: xr.Dataset) -> dict[str, Points]:
+    """Divide `count` measured points into curves: the points of a curve differ only in the condition `main`.
 
     If there are more curves than colours, all points form one curve.
     """
-    others = {name: each for name, each in found.measured.conditions.items() if name != main}
-    rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
+    others = {name: each for name, each in varied.items() if name != main}
+    rows = np.stack(list(others.values()), axis=1) if others else np.zeros((count, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
     if not 1 < len(places) <= colours.most():
         return {"measured": np.arange(len(rows))}

@@ -5,10 +5,9 @@ from __future__ import annotations
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.view import View, draw
 
-#: Limits of the film ratio: below 0.5, a computed breakthrough is an artefact; 1 and 3 separate lubrication regimes.
+#: Limits of the film ratio: below 0.5, a computed breakthrough is an artefact; above 3, the film separates the rollers.
 FILM_RATIOS = {
     0.5: "film ratio 0.5: breakthroughs below it are artefacts",
-    1.0: "film ratio 1: boundary below, mixed above",
     3.0: "film ratio 3: full film above",
 }
 STRIBECK = ("friction_coefficient", "asperity_load_share", "contact_length", "breakthrough_probability")

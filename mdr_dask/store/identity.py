@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 from collections import Counter
@@ -18,9 +19,8 @@ from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.campaign.definition import SAME_DIGITS
 from mdr_dask.errors import StoreError
-from mdr_dask.models.data_file import DataFile
 from mdr_dask.store.files import absolute
-from mdr_dask.store.layout import plain_values
+from mdr_dask.store.layout import by_digest, plain_values
 from mdr_dask.store.study import attributes, document, series_names
 
 log = logging.getLogger("mdr_dask.store")
@@ -133,8 +133,8 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
     lacking = [name for name in outputs if name not in held["outputs"]]
     if lacking:
         found.append(f"outputs: the store lacks {', '.join(lacking)}; every case would have to be computed again")
-    before = _leaves(json.loads(held["parameters"]), "")
-    now = _leaves(series.parameters.model_dump(mode="json"), "")
+    before = _leaves(by_digest(json.loads(held["parameters"])), "")
+    now = _leaves(by_digest(series.parameters.model_dump(mode="json")), "")
     varied = tuple(f"{axis}." for axis in axes.keys() | held_axes.keys())
     fixed = [path for path in sorted(before.keys() | now.keys()) if not f"{path}.".startswith(varied)]
     return found + [
@@ -143,25 +143,11 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Flatten nested parameters to dotted paths, and replace the names of files by digests of the files."""
+    """Flatten nested parameters to dotted paths."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
-        if isinstance(value, Mapping) and not _is_file(value):
-            found |= _leaves(value, f"{prefix}{name}.")
-        else:
-            found[prefix + name] = _by_digest(value)
+        found |= _leaves(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
     return found
-
-
-def _is_file(value: Any) -> bool:
-    return isinstance(value, Mapping) and value.keys() == DataFile.model_fields.keys()
-
-
-def _by_digest(value: Any) -> Any:
-    """Return a value in which the digest of a file replaces the name of the file, even inside a list."""
-    if isinstance(value, list):
-        return [_by_digest(each) for each in value]
-    return value["sha256"] if _is_file(value) else value
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
@@ -174,36 +160,47 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
         now = [by_path[axis["path"]] for axis in stored]
         old = _entries([axis["values"] for axis in stored])
         wanted = _entries([plain_values(axis.values) for axis in now])
-        new = [position for entry, position in wanted.items() if entry not in old]
-        behind = iter(range(len(old), len(old) + len(new)))
+        behind = itertools.count(len(old))
         places[dim] = np.array([old[entry] if entry in old else next(behind) for entry in wanted], dtype=np.int64)
-        axes += [_longer(series, axis, before, new) for axis, before in zip(now, stored, strict=True)]
+        axes += [_longer(series, axis, before, places[dim]) for axis, before in zip(now, stored, strict=True)]
     return replace(series, axes=tuple(axes)), places
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
     """Return the position of each entry along a dimension. An entry has one value of each axis of this dimension.
 
-    The key of an entry is the text of these values, together with the number of equal entries before the entry.
+    The key of an entry is the text of these values, in which digests replace the names of files, together with the
+    number of equal entries before the entry.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
     for position, entry in enumerate(zip(*columns, strict=True)):
-        text = json.dumps([float(f"{x:.{SAME_DIGITS}g}") if isinstance(x, float) else x for x in entry], sort_keys=True)
+        plain = [float(f"{x:.{SAME_DIGITS}g}") if isinstance(x, float) else by_digest(x) for x in entry]
+        text = json.dumps(plain, sort_keys=True)
         found[text, seen[text]] = position
         seen[text] += 1
     return found
 
 
-def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int]) -> Axis:
+def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], places: IntArray) -> Axis:
+    """Return an axis with the stored values, and then the new values of the given axis.
+
+    `places` are the positions of the values of the given axis. Lists and mappings are taken from the given axis,
+    because their files may have been moved.
+    """
     values = [_restore(series, axis.path, plain) for plain in stored["values"]]
-    labels = stored["labels"]
-    if labels is not None:
-        labels = tuple(labels) + tuple(axis.labels[i] if axis.labels else str(axis.values[i]) for i in new)
+    labels = None if stored["labels"] is None else list(stored["labels"])
+    for position, (place, value) in enumerate(zip(places, axis.values, strict=True)):
+        if place == len(values):
+            values.append(value)
+            if labels is not None:
+                labels.append(axis.labels[position] if axis.labels else str(value))
+        elif isinstance(stored["values"][place], Mapping | list):
+            values[place] = value
     return replace(
         axis,
-        values=tuple(values) + tuple(axis.values[i] for i in new),
-        labels=labels,
+        values=tuple(values),
+        labels=None if labels is None else tuple(labels),
         unit=None if labels else axis.unit,
     )
 

@@ -20,6 +20,7 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from mdr_dask import models
 from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import Output, Status
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.plan import Template
 from mdr_dask.store.files import (
@@ -109,7 +110,29 @@ def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
         return False
     wanted = json.loads(json.dumps(_series_attributes(template)))
     shown = root["consolidated_metadata"]["metadata"].get(group_name(template.series.name, "status"), {"shape": None})
-    return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
+    return bool(
+        shown["shape"] == list(template.shape)
+        and _by_content(wanted).items() <= _by_content(held["attributes"]).items()
+    )
+
+
+def _by_content(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the attributes of a series in which digests replace the names of files."""
+    return {name: by_digest(json.loads(each) if name == "parameters" else each) for name, each in attributes.items()}
+
+
+def by_digest(value: Any) -> Any:
+    """Return a value in which the digest of each file replaces its name and path, also inside lists and mappings.
+
+    A study whose files were moved is still the same study.
+    """
+    if isinstance(value, list):
+        return [by_digest(each) for each in value]
+    if not isinstance(value, Mapping):
+        return value
+    if value.keys() == DataFile.model_fields.keys():
+        return value["sha256"]
+    return {name: by_digest(each) for name, each in value.items()}
 
 
 def group_names(members: Mapping[str, Any]) -> list[str]:

@@ -62,11 +62,23 @@ def test_columns_that_may_be_an_axis_are_not_left_out(heading):
     """An axis without a column would be an unknown of the calibration."""
     text = f"velocity [m/s];mu;{heading};F_t [N];room [degC];n\n1;0,3;2;700;20;30\n2;0,4;5;800;21;30\n"
     axes = {"velocity": (1, 2), "normal_force": (1e-3, 6)}
-    with pytest.raises(
-        DataError, match="is not used, but its numbers lie in the range of the unknown 'normal_force': rename"
-    ):
+    with pytest.raises(DataError, match=f"{heading[:4]}.* is not used, but may contain 'normal_force', .*: rename"):
         read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, axes)
     assert read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2)}).remark.startswith("not used")
+
+
+@pytest.mark.parametrize(
+    ("axis", "unit", "values", "heading"),
+    [
+        ("temperature", "K", (333.15, 373.15), "T_oil [\u00b0C];100,3;59,8"),
+        ("line_load", "N/m", (450e3,), "w [N/mm];450;150"),
+    ],
+)
+def test_a_column_with_the_unit_of_an_axis_is_refused_whatever_its_numbers(axis, unit, values, heading):
+    name, *numbers = heading.split(";")
+    text = f"velocity [m/s];mu;{name}\n1;0,3;{numbers[0]}\n2;0,4;{numbers[1]}\n"
+    with pytest.raises(DataError, match=f"may contain '{axis}'"):
+        read_measured(text, "rig.csv", {"velocity": "m/s", axis: unit}, OUTPUTS, {axis: values})
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])

@@ -170,11 +170,12 @@ def test_bad_input_is_refused_with_its_reason(text, change, message):
 
 def test_points_belong_to_the_nearest_value_of_a_condition_with_few_values():
     rows = "".join(f"{force}, {v}, 0.1, 0.01\n" for force in (0.997, 1.004) for v in (0.000995, 0.00238))
-    text = f"{RIG.splitlines()[0]}\n{rows}"
+    text = f"{RIG.splitlines()[0]}, Streuung\n{rows}".replace("0.1, 0.01\n", "0.1, 0.01, 0.02\n")
     data = study().isel(normal_force=2, velocity=[0, 1]).assign_attrs(measured={"name": "rig.csv", "text": text})
     found = calibration({"": data})["measured"].item()
     assert "4 of 4 points differ in normal_force by up to 0.4 %" in found
     assert "4 of 4 points differ in velocity by up to 0.5 %" in found
+    assert "not used: Streuung" in found
 
 
 def test_a_study_without_a_table_half_filled_or_sampled_is_refused():

@@ -48,6 +48,12 @@ def test_points_without_the_parameter_of_the_curves_are_black(groups, tmp_path):
     assert "measured" in [key.label for key in figure.panels[0].keys]
 
 
+def test_a_column_that_may_contain_the_axis_of_a_selection_is_refused(groups, tmp_path):
+    groups = {"": groups[""].isel(normal_force=[0])}
+    with pytest.raises(DataError, match="column 'w' is not used, but may contain 'normal_force'"):
+        drawn(groups, tmp_path, "velocity [m/s],w [N],friction_coefficient\n0.01,0.1,2e-3\n0.02,1,5e-3\n")
+
+
 def test_points_without_a_curve_are_counted_with_their_condition(groups, tmp_path):
     table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.01,7,5e-3\n"
     figure = drawn(groups, tmp_path, table)
@@ -109,6 +115,17 @@ def test_calibration_shows_what_the_fit_found(tmp_path):
     assert density.x.label == "normal force $F_N$ [mN]"
     shades = [trace for trace in density.traces if trace.kind == "band"]
     assert bool(shades) != (density.title == "not determined")
+
+
+def test_calibration_is_drawn_against_the_condition_with_the_most_set_values(tmp_path):
+    """The two loads of the study have eight measured values, because an instrument does not meet them exactly."""
+    groups = planted.make(tmp_path, CAMPAIGN + "  hurst: {linear: [0.5, 0.9, 5]}\n")
+    rows = [f"{v},{f * (1 + k / 1e3)},{4e-3 * v**0.3}" for f in (0.1, 1) for k, v in enumerate((1e-3, 1e-2, 0.1, 1))]
+    path = tmp_path / "rig.csv"
+    path.write_text("\n".join(["velocity [m/s],normal_force [N],friction_coefficient", *rows]) + "\n")
+    panel = available("sliding_friction")["calibration"].describe(with_table(groups, path)).panels[0]
+    assert panel.x.quantity == "velocity"
+    assert [trace.column("x").size for trace in panel.traces if trace.kind == "curve"] == [4, 4]
 
 
 @pytest.mark.parametrize(("factor", "warnings"), [(1, 0), (1000, 1)])

@@ -11,6 +11,7 @@ from overlaps import problems
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError
 from mdr_dask.plots import available, history, page
+from mdr_dask.plots.named import FILM_RATIOS
 from mdr_dask.units import conversion
 
 V = "  velocity: {geometric: [0.01 mm/s, 10 m/s, 8]}\n"
@@ -110,6 +111,11 @@ def test_every_named_figure_is_tested_here():
     models = ("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear")
     known = {name for model in models for name in available(model)}
     assert known == {*FIGURES, "history", "calibration", "master_curve"}
+
+
+def test_a_film_ratio_below_one_is_not_called_boundary_lubrication():
+    """In this model, the asperities carry less than a tenth of the load at half this film ratio."""
+    assert [*FILM_RATIOS] == [0.5, 3.0]
 
 
 def test_a_missing_output_is_named_and_leaves_no_empty_panel(tmp_path):
