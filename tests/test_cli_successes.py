@@ -57,6 +57,13 @@ def test_a_table_can_be_given_to_a_calibration_and_to_nothing_else(store, capsys
     assert "--measured and --plot can be used only with `calibration`" in capsys.readouterr().err
 
 
+def test_a_refused_law_is_named_after_the_others(store, capsys):
+    assert main(["fit", store, "collapse", "indenter", "plateau"]) == 2
+    printed = capsys.readouterr()
+    assert "plateau" in printed.out
+    assert "indenter: expected" in printed.err
+
+
 def test_an_interrupted_command_reports_that_results_are_kept(monkeypatch, capsys):
     def stopped(*_):
         raise KeyboardInterrupt

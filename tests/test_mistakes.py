@@ -29,6 +29,7 @@ MISTAKES = [
     # words
     ("velocity", "speed", "13:3: parameters.speed: ", "did you mean 'velocity'?"),
     ("sliding_friction", "json:MODEL", "2:8: model: ", "expected module:NAME"),
+    ("hurst: 0.7", "indenter: {shape: plane, velocity: 1 m/s}", "8:28: ", "write it beside 'indenter', not inside"),
     ("accuracy: 1 %", "outputs: [mu]", "14:11: outputs[0]: ", "did you mean 'friction_coefficient'?"),
     ("accuracy: 1 %", "outputs: film", "14:10: outputs: ", "got 'film'", "write [film]"),
     ("accuracy: 1 %", "sampling: sobol", "14:11: sampling: ", "write {sobol: ...}"),

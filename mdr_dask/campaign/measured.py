@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask import models
-from mdr_dask.arrays import SAME, FloatArray
+from mdr_dask.arrays import SAME, BoolArray, FloatArray
 from mdr_dask.campaign.definition import Series
 from mdr_dask.campaign.document import LARGEST
 from mdr_dask.errors import DataError
@@ -103,23 +103,35 @@ def read_measured(
 def belonging(values: FloatArray, known: ArrayLike) -> FloatArray:
     """Return the known value nearest to each value, or NaN if the relative difference exceeds `tables.AGREE`.
 
-    For example, a measured value of 49.9 % belongs to the set value of 50 %.
+    For example, a measured value of 49.9 % belongs to the set value of 50 %. A difference that exceeds `tables.AGREE`
+    only by rounding is allowed.
     """
     set_values = np.atleast_1d(np.asarray(known, dtype=np.float64))
     near = set_values[np.argmin(np.abs(values[:, None] - set_values), axis=1)]
-    return np.where(np.abs(values - near) <= AGREE * np.abs(near), near, np.nan)
+    return np.where(np.abs(values - near) <= AGREE * (1 + SAME) * np.abs(near), near, np.nan)
 
 
-def scatter(measured: Measured, known: Mapping[str, ArrayLike]) -> Iterator[str]:
-    """Yield a sentence for each condition with measured values that are near, but not equal to, a known value."""
+def outside(values: FloatArray, known: ArrayLike) -> BoolArray:
+    """Return which values lie outside the range of the known values, and do not belong to an end of this range."""
+    low, high = np.min(known), np.max(known)
+    found: BoolArray = ((values < low) | (values > high)) & np.isnan(belonging(values, [low, high]))
+    return found
+
+
+def scatter(measured: Measured, known: Mapping[str, ArrayLike], units: Mapping[str, str]) -> Iterator[str]:
+    """Yield a sentence for each condition with measured values that are near, but not equal to, a known value.
+
+    `units` contains the SI units of the conditions.
+    """
     for name, values in known.items():
         rows = measured.conditions[name]
         away = np.abs(rows - (near := belonging(rows, values)))
         count = int(np.count_nonzero(away > SAME * np.abs(near)))
         if count:
-            most = 100 * float(np.nanmax(away / np.abs(np.where(near, near, np.nan))))
+            share = 100 * float(np.nanmax(away / np.abs(np.where(near, near, np.nan))))
+            most = f"{np.nanmax(away):.2g} K" if units[name] == "K" else f"{share:.2g} %"
             yield (
-                f"{count} of {rows.size} points differ in {name} by up to {most:.2g} % from the nearest value of the "
+                f"{count} of {rows.size} points differ in {name} by up to {most} from the nearest value of the "
                 "study, and count as points at this value"
             )
 
@@ -231,18 +243,17 @@ def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
     yield f"conditions {', '.join(ranges.values()) or 'none'}"
     yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
     reach_of = _reach(model, series, found.conditions)
-    yield from scatter(found, {name: low for name, (low, high) in reach_of.items() if low == high})
+    yield from scatter(found, {name: low for name, (low, high) in reach_of.items() if low == high}, units)
     if found.errors is not None and not found.errors.all():
         yield ZERO
-    outside = [
-        f"{line}, {name} {shown(float(value), units[name])} (study: {shown(low, units[name])} to "
-        f"{shown(high, units[name])})"
+    off = [
+        f"{found.lines[row]}, {name} {shown(float(found.conditions[name][row]), units[name])} (study: "
+        f"{shown(low, units[name])} to {shown(high, units[name])})"
         for name, (low, high) in reach_of.items()
-        for line, value in zip(found.lines, found.conditions[name], strict=True)
-        if not low - AGREE * abs(low) <= value <= high + AGREE * abs(high)
+        for row in np.flatnonzero(outside(found.conditions[name], (low, high)))
     ]
-    if outside:
-        first = outside[0] + further(len(outside))
+    if off:
+        first = off[0] + further(len(off))
         yield f"outside the ranges of the study, so that the fit will refuse the table: {first}"
     else:
         yield "every row lies within the ranges of the study"

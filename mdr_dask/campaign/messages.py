@@ -205,7 +205,11 @@ def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the message about an unknown key, with the new name of a renamed key, or with the most similar key."""
+    """Return the message about an unknown key.
+
+    The message contains the new name of a renamed key, or the place of a key that belongs into a mapping inside or
+    outside this one, or the most similar key.
+    """
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:
@@ -213,7 +217,16 @@ def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
     known = around.model_fields if around else {}
     holding = [name for name, info in known.items() for one in fields.structures(info) if path[-1] in one.model_fields]
     inside = f" (write {holding[0]}: {{{path[-1]}: ...}})" if holding else ""
-    return f"unknown key{inside or did_you_mean(path[-1], list(known))}"
+    return f"unknown key{inside or _further_out(path, kind, data) or did_you_mean(path[-1], list(known))}"
+
+
+def _further_out(path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Return a hint if an unknown key belongs into one of the mappings around its own mapping."""
+    for depth in range(len(path) - 2, -1, -1):
+        around = _structure_around((*path[:depth], path[-1]), kind, data)
+        if around and path[-1] in around.model_fields:
+            return f" (write it beside {str(path[depth])!r}, not inside)"
+    return ""
 
 
 def _structure_around(path: Path, kind: type[BaseModel], data: Any) -> type[BaseModel] | None:

@@ -77,6 +77,7 @@ def fit(
     """
     from mdr_dask import fits as room
     from mdr_dask import store as stores
+    from mdr_dask.errors import FitError
     from mdr_dask.fits.calibration import with_table
     from mdr_dask.questions import selection
 
@@ -97,12 +98,19 @@ def fit(
     groups = selection.select_all(groups, selections, tell)
     if measured is not None:
         groups = with_table(groups, measured)
+    refused = []
     for name in names:
-        found = known[name].results(groups)
+        try:
+            found = known[name].results(groups)
+        except FitError as error:
+            refused.append(f"{name}: {error}")
+            continue
         for group, result in found.items():
             if (len(names) > 1 or len(found) > 1) and not form:
                 say(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
             _print(result, group, form, limit)
+    if refused:
+        raise FitError("\n".join(refused))
     if figure is not None:
         from mdr_dask.plots import available
         from mdr_dask.plots.base import provenance

@@ -104,8 +104,9 @@ class Fitted:
     def holds(self, where: Callable[[int], str] | None = None) -> str:
         """Return a sentence on whether the law with the fitted constants holds; ``where(k)`` describes case k."""
         if np.isnan(self.constants[0]).any():
-            return f"not tested: these cases do not determine the constants; departs by {100 * self.rms:.2g} % rms"
-        return verdict(self.residuals, self.count, self.constants.shape[1], where)
+            departs = _size(100 * self.rms, np.nan, logarithmic=True)
+            return f"not tested: these cases do not determine the constants; departs by {departs} rms"
+        return verdict(self.residuals, self.count, self.constants.shape[1], where, logarithmic=True)
 
 
 def fitted(
@@ -159,19 +160,21 @@ def verdict(
     where: Callable[[int], str] | None = None,
     *,
     excluded: bool = False,
+    logarithmic: bool = False,
 ) -> str:
     """Return a sentence on whether a law holds, from a stack of the relative deviations of the data from the law.
 
     `constants` is the number of constants that were fitted to the data. ``where(k)`` describes case k in words.
     `excluded` is true if the interval of a fitted constant does not contain the stated value; scatter then does not
-    explain the deviations.
+    explain the deviations. `logarithmic` is described in `law_holds`.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
     place = where(int(np.argmax(np.abs(residuals[0])))) if where else ""
     chance = bootstrap.chance(residuals, count)
     by_chance = None if excluded and not np.isnan(chance) else chance
-    return law_holds(residuals[0], by_chance, constants, place, bootstrap.scatter(residuals, count))
+    scatter = bootstrap.scatter(residuals, count)
+    return law_holds(residuals[0], by_chance, constants, place, scatter, logarithmic=logarithmic)
 
 
 def excludes(stack: FloatArray, count: int, stated: float) -> bool:
@@ -186,31 +189,40 @@ def short(number: float) -> str:
 
 
 def law_holds(
-    departures: FloatArray, chance: float | None, constants: int = 0, where: str = "", scatter: float = 0.0
+    departures: FloatArray,
+    chance: float | None,
+    constants: int = 0,
+    where: str = "",
+    scatter: float = 0.0,
+    *,
+    logarithmic: bool = False,
 ) -> str:
     """Return a sentence on whether a law holds, from the relative deviations of the data.
 
     `chance` is the probability that scatter and errors alone cause such deviations. `chance` is NaN if this probability
     is unknown, and None if scatter and errors cannot cause the deviations. `scatter` is the rms deviation that scatter
     and errors alone exceed with a probability of 5 %. The verdict can be *yes* only if `scatter` is at most `WITHIN`,
-    and *approximately* only if `scatter` is at most `APPROXIMATE`.
+    and *approximately* only if `scatter` is at most `APPROXIMATE`. If `logarithmic` is true, the deviations are
+    differences of natural logarithms, and a large difference is described by a factor.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
     rms, largest = 100 * np.sqrt(np.mean(departures**2)), 100 * np.max(np.abs(departures))
     size = max(rms, largest / 2)
     limit = 100 * (WITHIN if max(size, 100 * scatter) <= 100 * WITHIN else APPROXIMATE)
-    mean, most = _percentage(rms, limit), _percentage(largest, 2 * limit)
     if departures.size == 1:
-        departs, limits = f"departs by {_signed(float(departures.flat[0]), mean)} %", f"limit {limit:g} %"
+        one = 100 * float(departures.flat[0])
+        departs = f"departs by {_size(one, limit, logarithmic, '-' if one < 0 else '+')}"
+        limits = f"limit {limit:g} %"
     else:
-        departs = f"departs by {mean} % rms, at most {most} %{f' at {where}' if where else ''}"
+        mean, most = _size(rms, limit, logarithmic), _size(largest, 2 * limit, logarithmic)
+        departs = f"departs by {mean} rms, at most {most}{f' at {where}' if where else ''}"
         limits = f"limits {limit:g} % and {2 * limit:g} %"
     if np.isnan(scatter) or (chance is not None and np.isnan(chance) and size > limit):
         return f"not tested: too few realisations to estimate the scatter; {departs}"
     if np.isinf(scatter):
         return f"not tested: errors of the results are unknown; {departs}"
-    hidden = f"scatter alone may cause {_plain(short(100 * scatter))} % rms"
+    hidden = f"scatter alone may cause {_size(100 * scatter, np.nan, logarithmic)} rms"
     if size > limit and (chance is None or chance < DOUBTFUL):
         because = limits if chance is None else f"scatter alone would cause this with {_probability(chance)}"
         return f"no: {departs}; {because}"
@@ -227,18 +239,17 @@ def _probability(chance: float | None) -> str:
     return f"probability {chance:.2g}" if chance else f"probability below {1 / bootstrap.RESAMPLES:g}"
 
 
-def _signed(number: float, digits: str) -> str:
-    return digits if digits == "0" else f"{'-' if number < 0 else '+'}{digits}"
+def _size(percent: float, limit: float, logarithmic: bool, sign: str = "") -> str:
+    """Return a departure as text: a percentage, or a factor if it is a large difference of logarithms.
 
-
-def _percentage(number: float, limit: float) -> str:
-    """Return a percentage with two digits, or with four digits if two digits would make it look equal to the limit."""
+    A percentage has two digits, or four digits if two digits would make it look equal to the limit. It has no
+    exponent, and a percentage below 1e-4 % becomes 0.
+    """
+    if logarithmic and abs(percent) > 200 * APPROXIMATE:
+        return f"a factor of {short(np.exp(percent / 100))}"
+    number = abs(percent)
     text = f"{number:.2g}"
-    return _plain(text if text != f"{limit:.2g}" else f"{number:.4g}")
-
-
-def _plain(number: str) -> str:
-    """Write a percentage without an exponent; a percentage below 1e-4 % becomes 0."""
-    if "e-" in number:
-        return "0"
-    return f"{float(number):.0f}" if "e+" in number else number
+    text = text if text != f"{limit:.2g}" else f"{number:.4g}"
+    if "e-" in text or text == "0":
+        return "0 %"
+    return f"{sign}{f'{float(text):.0f}' if 'e+' in text else text} %"

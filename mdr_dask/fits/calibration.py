@@ -249,8 +249,9 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     measured = measured_of(dataset)
     meaning = dataset[measured.output].attrs.get("long_name", measured.output)
     compared = f"{measured.values.size} points, compared with {measured.output}: {meaning}"
-    few = {name: dataset[name].to_numpy() for name in measured.conditions if dataset[name].size < FEWEST}
-    compared = "; ".join(filter(None, [compared, measured.remark, *scatter(measured, few)]))
+    few = {name: dataset[name] for name in measured.conditions if dataset[name].size < FEWEST}
+    units = {name: str(held.attrs.get("units", "1")) for name, held in few.items()}
+    compared = "; ".join(filter(None, [compared, measured.remark, *scatter(measured, few, units)]))
     return summary(calibrate(dataset, measured)).assign(measured=((), compared, {"units": "1"}))
 
 
@@ -301,7 +302,10 @@ def _bound(found: Calibration, k: int) -> dict[str, float]:
     if found.free != [k] or low == high:
         return {}
     likely = found.values[found.posterior.density > found.posterior.density.max() - OPEN, k]
-    return {"_low": float(likely.min()), "_high": np.inf} if high else {"_low": -np.inf, "_high": float(likely.max())}
+    if high:
+        return {"_low": float(likely.min()), "_high": np.inf}
+    least = 0.0 if found.prediction.scales[k].logarithmic else -np.inf
+    return {"_low": least, "_high": float(likely.max())}
 
 
 def _correlation(found: Calibration, one: int, other: int) -> float:

@@ -146,7 +146,7 @@ def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, wher
     if np.isnan(free[0]):
         return "not tested: the cases differ too little to determine the exponent"
     excluded = excludes(free, count, power)
-    return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where, excluded=excluded)
+    return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where, excluded=excluded, logarithmic=True)
 
 
 def nonlinear(
@@ -178,7 +178,7 @@ def nonlinear(
     found = fitted(fit, lambda rows, constants: rows - model(constants), logs, count, stated)
     rest = logs - model(np.broadcast_to(stated, (len(logs), stated.size)))
     excluded = excludes(found.constants[:, 0], count, stated[0])
-    sentence = verdict(rest, count, 0, where, excluded=excluded)
+    sentence = verdict(rest, count, 0, where, excluded=excluded, logarithmic=True)
     errors: Variables = {}
     for end, which, left in (("", "fitted", found.residuals[0]), ("_stated", "stated", rest[0])):
         errors |= measure(f"rms_error{end}", rms(left), f"rms relative deviation with the {which} constants")

@@ -18,7 +18,7 @@ from mdr_dask.units import conversion
 
 DEGREES = range(1, 7)  # degrees of the polynomials that are fitted to each curve, in order to estimate the scatter
 HOLDS = {"yes", "approximately"}
-LOG = float(np.log(10.0))  # factor that converts a small deviation in decades into a relative deviation
+LOG = float(np.log(10.0))  # factor that converts decades into natural logarithms, which are small relative deviations
 
 
 def laws_of(
@@ -52,7 +52,8 @@ def laws_of(
     verdicts = {}
     for law in fits:
         where = f"{result.groups[np.argmax(np.abs(law.departures))]:.4g} {'' if unit == '1' else unit}".rstrip()
-        verdicts[law.name] = law_holds(LOG * law.departures[free], law.chance, len(law.constants), where, scatter)
+        departures, constants = LOG * law.departures[free], len(law.constants)
+        verdicts[law.name] = law_holds(departures, law.chance, constants, where, scatter, logarithmic=True)
     return fits, verdicts
 
 
@@ -140,7 +141,7 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
     worst = int(np.argmax(np.abs(off)))
     unit = curve["curve_abscissa"].attrs["units"]
     place = f"{curve.attrs['abscissa']} = {10 ** x[worst]:.3g} {'' if unit == '1' else unit}".rstrip()
-    return law_holds(LOG * off, chance, 0, f"{place} of the merged curve")
+    return law_holds(LOG * off, chance, 0, f"{place} of the merged curve", logarithmic=True)
 
 
 def _scatter(x: FloatArray, y: FloatArray, members: list[Any], degree: int) -> tuple[float, float, int]:

@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import JOINED, is_called, nearest
 from mdr_dask.models.parts.moduli_table import WAYS, moduli_of
-from mdr_dask.tables import AGREE, decoded, numbers, read_sheet
+from mdr_dask.tables import AGREE, decoded, further, numbers, read_sheet
 from mdr_dask.units import conversion, converts, is_unit
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ LEAST_JUMP = 3.0
 def read_table(path: str | Path) -> pd.DataFrame:
     """Read a table of numbers below a row of names.
 
-    ``attrs["units"]`` contains the units if the table has a row of units.
+    ``attrs["units"]`` contains the units if the table has a row of units. The index contains the place of each row in
+    the file, as the beginning of a message.
     """
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
@@ -39,7 +40,8 @@ def read_table(path: str | Path) -> pd.DataFrame:
         twice = next(name for name in names if names.count(name) > 1)
         raise DataError(f"{path}: column {twice!r} is given twice: delete or rename one of the two")
     kept = [k for k, column in enumerate(values.T) if not np.all(np.isnan(column))]  # columns of words are left out
-    table = pd.DataFrame(values[:, kept], columns=[names[k] for k in kept])
+    places = [line.message(str(path), "") for line in sheet.lines]
+    table = pd.DataFrame(values[:, kept], columns=[names[k] for k in kept], index=places)
     units = {names[k]: sheet.units[k] for k in kept}
     table.attrs["units"] = units if any(units.values()) else {}
     return _with_moduli(table)
@@ -214,10 +216,18 @@ def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
     """Return the value of `by` for each curve, and the points of each curve as log10(abscissa) and log10(ordinates)."""
-    rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
-    if rows.size == 0 or np.any(rows <= 0):
-        names = " and ".join(repr(name) for name in (over, *ordinates))
-        raise DataError(f"{names} must be positive: curves are shifted along logarithmic axes")
+    names = [over, *ordinates]
+    rows = frame[names].to_numpy(dtype=np.float64)
+    if rows.size == 0:
+        raise DataError(f"expected numbers in the columns {', '.join(names)}, got none")
+    wrong = np.argwhere(rows <= 0)
+    if wrong.size:
+        row, column = wrong[0]
+        place = frame.index[row] if isinstance(frame.index[row], str) else f"row {frame.index[row]}: "
+        raise DataError(
+            f"{place}{names[column]!r} must be positive, because curves are shifted along logarithmic axes, got "
+            f"{rows[row, column]:g}{further(len({*wrong[:, 0]}))}"
+        )
     groups = frame[by].to_numpy(dtype=np.float64)
     labels = clusters(groups, rows[:, 0])
     parts = [labels == label for label in np.unique(labels)]

@@ -74,7 +74,7 @@ def _films(data: xr.Dataset) -> Variables:
         found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative deviation from the fit")
         departures.append(residuals)
         of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
-    sentences = (law_holds(np.concatenate(each), None) for each in (of_stated, departures))
+    sentences = (law_holds(np.concatenate(each), None, logarithmic=True) for each in (of_stated, departures))
     return found | holds(*sentences)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import aggregation, bootstrap
 from mdr_dask.arrays import SAME, FloatArray
-from mdr_dask.campaign.measured import Measured, belonging
+from mdr_dask.campaign.measured import Measured, belonging, outside
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown
@@ -106,16 +106,12 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
     dataset = dataset.squeeze(single)
     for name, wanted in measured.conditions.items():
         held = dataset[name]
-        if held.ndim == 0:
-            ends = [float(held)]
-            off = np.isnan(belonging(wanted, ends))
-        else:
-            low, high = ends = [float(held.min()), float(held.max())]
-            off = ((wanted < low) | (wanted > high)) & np.isnan(belonging(wanted, ends))
+        off = outside(wanted, held.to_numpy())
         if off.any():
             worst = int(np.flatnonzero(off)[0])
             unit = str(held.attrs.get("units", "1"))
-            measured_at, *known = (shown(float(value), unit, 9) for value in (wanted[worst], *ends))
+            ends = dict.fromkeys([float(held.min()), float(held.max())])
+            measured_at, *known = (shown(value, unit, 9) for value in (float(wanted[worst]), *ends))
             hint = "" if held.ndim else " only (delete the column to use this value)"
             what = f"{name} is {measured_at}, but this study has {' to '.join(known)}{hint}"
             raise DataError(measured.lines[worst].message(measured.source, what))

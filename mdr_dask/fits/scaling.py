@@ -268,7 +268,7 @@ def _collapse(data: xr.Dataset) -> Variables:
     if "contact_slope" in data:
         slopes = table_of(data, spectral_slope(data), output="contact_slope").logarithms(used)
         of_contact = collapse(x, bootstrap.difference(stack, slopes), curve, start, reference, vertical=False)
-        stated = verdict(of_contact.residuals, count, of_contact.constants, where)
+        stated = verdict(of_contact.residuals, count, of_contact.constants, where, logarithmic=True)
     before = collapse(x, stack[:1], np.zeros_like(curve), np.zeros(1), 0).residuals
     return {
         **measure("rms_error", rms(found.residuals[0]), "rms relative distance of the points from the common curve"),
@@ -277,7 +277,7 @@ def _collapse(data: xr.Dataset) -> Variables:
         ),
         **measure("cases", int(used.size), "number of points of the shifted curves"),
         **_shifts(np.unique(force), loads, found, start - start[reference], count),
-        **holds(stated, verdict(found.residuals, count, found.constants, where)),
+        **holds(stated, verdict(found.residuals, count, found.constants, where, logarithmic=True)),
     }
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: Modules of this package that have a tuple ``PLOTS``.
-SUBJECTS = ("named", "history", "calibration", "master_curve")
+SUBJECTS = ("named", "history", "calibration", "measured", "master_curve")
 
 #: Entry point group in which other packages offer tuples of `Plot`.
 GROUP = "mdr_dask.plots"

@@ -1,4 +1,4 @@
-"""Figures of a master curve: the curves as measured, the merged curve and the shift factors."""
+"""Figures of a master curve: the curves before shifting, the merged curve and the shift factors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 
 
 def draw_master_curve(curve: xr.Dataset) -> Figure:
-    """Draw a master curve: the curves as measured, the merged curve and the shift factors.
+    """Draw a master curve: the curves before shifting, the merged curve and the shift factors.
 
     The bars and the band show 68 % intervals. The merged curve is solid in the range that was measured in the reference
     condition, such as the reference temperature, and dashed outside this range.
@@ -74,7 +74,7 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
     channels = _channels(curve)
     names = [_words(curve.attrs[channel]) for channel in channels]
     up = Axis(labels.with_unit(", ".join(names), curve["curve_ordinate"].attrs["units"]), log=True)
-    measured = Panel(Axis(across, log=True), up, title="as measured")
+    measured = Panel(Axis(across, log=True), up, title="before shifting")
     merged = Panel(Axis(f"shifted {across}", log=True), up, title="merged")
     values = curve[by].values
     bar = colours.bar(_label(by, curve[by]), values) if values.size > colours.most() else None

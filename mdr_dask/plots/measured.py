@@ -18,6 +18,7 @@ from mdr_dask.fits.calibration import measured_of, with_table
 from mdr_dask.plots import labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.plots.view import figure_of, varied
 from mdr_dask.units import shown
 
 #: Half width of a 95 % interval divided by the standard error.
@@ -36,11 +37,25 @@ def with_points(
 def _with_points(figure: Plot) -> Plot:
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawn = figure.draw(groups)
-        if figure.name != "calibration":
+        if figure.name not in ("calibration", NAME):
             add_points(drawn, groups)
         return drawn
 
     return replace(figure, draw=draw)
+
+
+def _measured(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw the measured output, and the measured points, against the condition with the most values in the study."""
+    data = next(iter(groups.values()))
+    try:
+        measured = measured_of(data)
+    except FitError as error:
+        raise DataError(str(error)) from None
+    along = [name for name in varied(data, measured.output) if name in measured.conditions]
+    drawn = figure_of(groups, measured.output, max(along, key=lambda name: data[name].size, default=""))
+    figure = drawn.draw(groups)
+    add_points(figure, groups)
+    return figure
 
 
 def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
@@ -61,14 +76,15 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
         )
     drawn = np.any([_add(panel, measured, data) for panel in panels], axis=0)
     along = {panel.x.quantity for panel in panels}
-    others = {name: np.atleast_1d(data[name]) for name in measured.conditions if name not in along}
+    others = {name: data[name] for name in measured.conditions if name not in along}
     if not drawn.all():
-        off = [name for name, known in others.items() if np.isnan(belonging(measured.conditions[name], known)).any()]
+        off = [name for name in others if _without_curve(panels, measured, name)[~drawn].any()]
         why = f"no curve has their {' or '.join(off)}" if off else "a logarithmic axis shows only numbers above 0"
         figure.leave_out([f"{np.count_nonzero(~drawn)} of {drawn.size} measured points: {why}"])
     figure.warnings += _apart(measured, data, [measured.output, *along])
     bars = f"{measured.error_column} taken as one standard error" if measured.errors is not None else ""
-    texts = (bars, measured.remark, *scatter(measured, others))
+    units = {name: str(known.attrs.get("units", "1")) for name, known in others.items()}
+    texts = (bars, measured.remark, *scatter(measured, others, units))
     figure.notes += [f"measured {measured.source}: {text}" for text in texts if text]
 
 
@@ -118,6 +134,14 @@ def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> np.ndarray:
     return found
 
 
+def _without_curve(panels: Sequence[Panel], measured: Measured, name: str) -> np.ndarray:
+    """Return a mask of the points whose value of a condition is not that of any curve in the panels."""
+    traces = [trace for panel in panels for trace in panel.traces if trace.what == "data"]
+    drawn = [float(trace.data[name]) for trace in traces if name in trace.data.coords and trace.data[name].ndim == 0]
+    values = measured.conditions[name]
+    return np.isnan(belonging(values, drawn)) if drawn else np.zeros(values.size, dtype=bool)
+
+
 def _differing(curves: list[xr.Dataset]) -> set[str]:
     """Return the names of the parameters whose values are not the same in all curves."""
     held = [{str(name): value.item() for name, value in each.coords.items() if value.ndim == 0} for each in curves]
@@ -152,3 +176,6 @@ def conditions(measured: Measured, data: xr.Dataset, here: np.ndarray) -> xr.Dat
     """Return the conditions of some measured points as coordinates."""
     units = {name: {"units": str(data[name].attrs.get("units", "1"))} for name in measured.conditions}
     return xr.Dataset(coords={name: ("point", each[here], units[name]) for name, each in measured.conditions.items()})
+
+
+PLOTS: tuple[Plot, ...] = (Plot(NAME, (), "the measured output with the measured points of the campaign", _measured),)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.campaign.measured import read_measured
+from mdr_dask.campaign.measured import belonging, outside, read_measured, scatter
 from mdr_dask.errors import DataError
 from mdr_dask.tables import decoded
 
@@ -135,6 +135,18 @@ def test_synonyms_of_a_short_name_are_read(heading):
     conditions = {"solid_temperature": "K", "velocity": "m/s"}
     found = read_measured(f"v [m/s];{heading} [°C];mu\n1;20;2\n2;20;3\n", "rig.csv", conditions, FRICTION)
     assert found.conditions["solid_temperature"].tolist() == [293.15, 293.15]
+
+
+def test_a_difference_of_one_percent_is_allowed_whatever_its_rounding():
+    values = np.array([0.099, 0.101, 0.0989, 0.1012, 1.01, 1.011])
+    np.testing.assert_equal(belonging(values, [0.1, 1.0]), [0.1, 0.1, np.nan, np.nan, 1.0, np.nan])
+    assert outside(values, [0.1, 1.0]).tolist() == [False, False, True, False, False, True]
+
+
+def test_differences_of_temperatures_are_in_kelvins():
+    found = read_measured("v [m/s];T [°C];mu\n1;20,5;2\n2;20;3\n", "rig.csv", {"v": "m/s", "T": "K"}, FRICTION)
+    (sentence,) = scatter(found, {"T": 293.15}, {"T": "K"})
+    assert "1 of 2 points differ in T by up to 0.5 K" in sentence
 
 
 def test_names_of_several_quantities_are_refused():

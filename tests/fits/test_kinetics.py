@@ -83,6 +83,15 @@ def test_the_closed_law_is_tested_with_its_own_jump_and_rate() -> None:
     assert np.all(other["rms_error"][2:] > found["rms_error"][2:])
 
 
+def test_a_measured_surface_has_a_rate_but_above_one_no_law() -> None:
+    data = store(np.array([1e-5, 1e-2]), 0.7, 0.3).drop_vars("hurst")
+    found = FIT["relaxation"].compute({"": data})
+    assert found["passing_number"].values.tolist() == pytest.approx([0.0157, 15.7], rel=1e-2)
+    assert found["rate"].notnull().all()
+    assert found["law_rate"].isnull().values.tolist() == [False, True]
+    assert found["law_holds"].values[1].startswith("not tested: eq. 4.12 needs the Hurst exponent")
+
+
 def test_nothing_relaxes_in_full_contact() -> None:
     data = store(ABOVE[:1], 0.7, 0.3)
     still = data["friction_coefficient_before"] + data["friction_coefficient_jump"]

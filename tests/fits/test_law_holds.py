@@ -26,6 +26,19 @@ def test_sentences(departures, chance, constants, begins):
     assert law_holds(np.array(departures), chance, constants, "x = 1").startswith(begins)
 
 
+@pytest.mark.parametrize(
+    ("departures", "departs"),
+    [
+        ([3.0, -4.0], "a factor of 34 rms, at most a factor of 55 at x = 1"),
+        ([0.01] * 99 + [0.5], "5.1 % rms, at most a factor of 1.6 at x = 1"),
+        ([-3.0], "a factor of 0.05"),
+        ([-0.17], "-17 %"),
+    ],
+)
+def test_large_differences_of_logarithms_are_factors(departures, departs):
+    assert law_holds(np.array(departures), 0.0, 0, "x = 1", logarithmic=True).startswith(f"no: departs by {departs};")
+
+
 RANKS = {"not tested": 0, "no": 0, "approximately": 1, "yes": 2}
 
 

@@ -170,7 +170,7 @@ def test_tables_that_are_ambiguous_or_incomplete_are_refused():
         master_curve(frame.rename(columns={"velocity": "frequency"}).assign(T=[1.0, 1, 2, 2]), "frequency", "mu", "T")
     with pytest.raises(DataError, match="expected a column 'hardness'"):
         master_curve(frame, ordinate="hardness")
-    with pytest.raises(DataError, match="must be positive"):
+    with pytest.raises(DataError, match=r"row 1: 'mu' must be positive, .*, got -1$"):
         master_curve(frame.assign(mu=[1.0, -1, 1, 1]))
     with pytest.raises(DataError, match="expected a reference between 1 and 2, got 50"):
         master_curve(frame, reference=50.0)

@@ -60,6 +60,23 @@ def test_points_without_a_curve_are_counted_with_their_condition(groups, tmp_pat
     assert "1 of 2 measured points: no curve has their normal_force" in figure.left_out
 
 
+def test_the_points_of_a_campaign_have_a_figure_with_a_reason_for_each_missing_point(groups, tmp_path):
+    table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.02,1,5e-3\n0.03,1,6e-3\n"
+    (tmp_path / "rig.csv").write_text(table)
+    given = with_table(groups, str(tmp_path / "rig.csv"))
+    figure = available("sliding_friction")["measured"].describe(given)
+    assert sum(trace.data["y"].size for trace in figure.panels[0].traces if trace.what == "measured") == 3
+    one = {key: data.isel(normal_force=[1]) for key, data in given.items()}
+    assert add_points_of(one) == ["1 of 3 measured points: no curve has their normal_force"]
+    with pytest.raises(DataError, match="expected a table of measurements"):
+        available("sliding_friction")["measured"].describe(groups)
+
+
+def add_points_of(groups):
+    left_out = available("sliding_friction")["measured"].describe(groups).left_out
+    return [text for text in left_out if "measured points" in text]
+
+
 def test_measured_conditions_scatter_around_the_values_of_the_curves(groups, tmp_path):
     table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.0997,2e-3\n0.01,1.003,5e-3\n0.01,1.1,5e-3\n"
     figure = drawn(groups, tmp_path, table)

@@ -110,7 +110,7 @@ def _unit(label: str) -> str:
 def test_every_named_figure_is_tested_here():
     models = ("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear")
     known = {name for model in models for name in available(model)}
-    assert known == {*FIGURES, "history", "calibration", "master_curve"}
+    assert known == {*FIGURES, "history", "calibration", "measured", "master_curve"}
 
 
 def test_a_film_ratio_below_one_is_not_called_boundary_lubrication():

@@ -20,6 +20,11 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 OPERATIONS_A_POINT = 10  # operations of a solution for each point of the line, chosen by trial for block sizes
+#: The solution of a general solid with n Prony terms needs about this number, times n (1 + n), of operations for each
+#: point. It is solved on at least three grids with 1, 2 and 4 nodes per point. About five sweeps over each grid need n
+#: operations for each node. About 15 products of the matrix of Newton's method need 3 n^2 operations in each contact
+#: and each free recovery, of which there is about one for every four points.
+OPERATIONS_OF_GENERAL = 35
 
 #: Outputs that have errors, each with the corresponding column of `Steady`.
 OUTPUTS = dict(
@@ -126,11 +131,12 @@ class _Group:
 
 def operations(block: Block[SlidingFriction]) -> float:
     """Return the approximate number of operations of a block, which grows with the points and the Prony terms."""
-    problems, points = sliding_problems(block), 0
+    problems, operations = sliding_problems(block), 0
     for setting, case, members in _groups(block, problems):
         lines = len(block.realisations) if setting.roughness.is_random else 1
         grid = 1 if case.oversampling == "auto" else case.oversampling
         solutions = problems.different(members)[0].size
-        modes = 0 if setting.terms is None else 4 * (1 + len(setting.terms.moduli))  # chosen by trial
-        points += lines * setting.roughness.points * grid * (1 + solutions * max(modes, 1))
-    return float(OPERATIONS_A_POINT * points)
+        terms = 0 if setting.terms is None else 1 + len(setting.terms.moduli)
+        solution = OPERATIONS_OF_GENERAL * terms * (1 + terms) or OPERATIONS_A_POINT
+        operations += lines * setting.roughness.points * grid * (OPERATIONS_A_POINT + solutions * solution)
+    return float(operations)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
 from mdr_dask.models.parts.loading_history import Jump, Protocol, pieces
 from mdr_dask.models.parts.material import solid_of
@@ -119,6 +122,19 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
     }
 
 
+def time_notes(sets: Sequence[VelocityJump]) -> tuple[str, ...]:
+    """Return a note with tau in seconds, the longest relaxation time of the materials of a study."""
+    units = []
+    for one in sets:
+        if one.material is not None:
+            with suppress(DataError, ValueError):  # the solver reports the problem for each case
+                units.append(one.time_unit())
+    if not units:
+        return ()
+    ends = dict.fromkeys(f"{end:.3g} s" for end in (min(units), max(units)))
+    return (f"relaxation_times are multiples of the longest relaxation time tau of the material: {' to '.join(ends)}",)
+
+
 SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
@@ -132,5 +148,5 @@ MODEL = Model(
     whole=("velocity", "normal_force", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
     coordinates=coordinates,
     numbers=(*NUMBERS,),
-    notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
+    notes=lambda sets: (*frequency_notes(sets), *load_notes(sets), *time_notes(sets)),
 )
