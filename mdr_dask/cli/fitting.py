@@ -97,6 +97,8 @@ def fit(
     groups = selection.select_all(groups, selections, tell)
     if measured is not None:
         groups = with_table(groups, measured)
+    for note in dict.fromkeys(note for data in groups.values() for note in data.attrs.get("notes", [])):
+        tell(note)
     for name in names:
         found = known[name].results(groups)
         for group, result in found.items():
@@ -192,5 +194,7 @@ def _sentences(attributes: dict[str, object]) -> list[str]:
             f"{attributes['left_out']} of {attributes['cases']} cases are left out, because they have no value"
         )
     if attributes["realisations"] == 1:
-        sentences.append("with one realisation, the scatter of samples counts as an interaction of parameters")
+        sentences.append(
+            "with one realisation, scatter between samples, if there is any, counts as an interaction of parameters"
+        )
     return [*sentences, str(attributes["advice"])]
