@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import chdtri
 
+from mdr_dask import models
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter
 from mdr_dask.errors import DataError, FitError
@@ -227,7 +228,9 @@ def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
     axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim}
-    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted)
+    declared = models.load(dataset.attrs["model"]).outputs if "model" in dataset.attrs else ()
+    dims = {each.name: each.dims for each in declared}
+    return read_measured(table["text"], table["name"], conditions, outputs, axes, dims, wanted)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:
