@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from mdr_dask import bootstrap
 from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.models.base import Status
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+#: The text for cases with failed and successful realisations (see `has_biased_means`).
+BIASED = "means over the other realisations of these cases may be biased"
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,14 @@ class Statistic:
     name: str
     meaning: str
     compute: Callable[[xr.DataArray, xr.DataArray | None], xr.DataArray | None]
+
+
+def has_biased_means(status: xr.DataArray) -> bool:
+    """Return whether a case has failed and successful realisations, so that the mean of the successful is biased."""
+    if "realisation" not in status.dims:
+        return False
+    failed = status.isin([Status.FAILED.value, Status.NOT_CONVERGED.value]).any("realisation")
+    return bool((failed & (status == Status.DONE.value).any("realisation")).any())
 
 
 def count(array: xr.DataArray) -> xr.DataArray:

@@ -38,9 +38,10 @@ def test_selected_values_are_stated(filled, capsys):
     held = ["plot", filled, "friction_coefficient", "--over", "velocity", "--by", "velocity"]
     assert main([*held[:-2], "--select", "normal_force=0.1 N", "--size", "85mm", "-o", "one.png"]) == 0
     printed = capsys.readouterr().err
-    assert all(part in printed for part in ("F_N = 0.1 N", "relaxation_time = 0.001 s", "95 % intervals"))
+    assert all(part in printed for part in ("F_N = 0.1 N", "relaxation_time = 1 ms", "95 % intervals"))
     assert "held fixed: " in Path("one.csv").read_text()
-    assert "normal_force = 0.1 N" in Path("one.csv").read_text()
+    assert "normal_force = 100 mN" in Path("one.csv").read_text()
+    assert "oversampling" not in Path("one.csv").read_text()  # a default setting of the solution
     map_of = ["plot", filled, "friction_coefficient", "--over", "normal_force", "--title", "Mine", "-o", "two.png"]
     assert main([*map_of, "--select", "velocity=1 m/s"]) == 0
     assert "v = 1 m/s" in capsys.readouterr().err

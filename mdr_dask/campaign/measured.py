@@ -54,10 +54,13 @@ def read_measured(
     conditions: Mapping[str, str],
     outputs: Mapping[str, str],
     axes: Mapping[str, ArrayLike] | None = None,
+    dims: Mapping[str, Collection[str]] | None = None,
     wanted: Collection[str] = (),
 ) -> Measured:
     """Read a table of measured points. `conditions` and `outputs` map names of possible columns to SI units, and `axes`
-    maps the names of the numerical axes of the study to their values.
+    maps the names of the numerical axes of the study to their values. `dims` maps the name of each output of the model
+    to the names of the coordinates of the output, such as the radius of a profile. DataError is raised if a column has
+    the name of a coordinate that only other outputs have.
 
     If the table contains several outputs, the output in `wanted` is read. A heading such as ``temperature`` may be
     short for ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An axis without a
@@ -77,13 +80,20 @@ def read_measured(
         what = f"a column with one output of the study ({', '.join(outputs)})"
         raise DataError(f"{source}: expected {what}, got {got}")
     output = found[0]
-    columns = [column for column in columns if column.name != output and column.name in present.union(axes or ())]
+    foreign = {name for each in (dims or {}).values() for name in each}.difference((dims or {}).get(output, ()))
+    for name in sheet.names:
+        if plain(name) in foreign:
+            what = f"column {name!r} is not used, because {output} does not depend on it"
+            raise DataError(f"{source}: {what}: give another output, or delete the column")
+    axes = {name: values for name, values in (axes or {}).items() if name not in foreign}
+    kept = present.union(axes).difference(foreign, [output])
+    columns = [column for column in columns if column.name in kept]
     columns.append(Column(output, outputs[output], short[output]))
     headings, unit, is_relative = _error_of(sheet, columns)
     unit_of_errors = "1" if is_relative else outputs[output]
     error = Column(ERROR, unit_of_errors, headings, needed=False, least=0.0, given_unit=unit)
     read = read_columns(sheet, [*columns, error], allow_missing=True)
-    _require_names(read, source, conditions, axes or {})
+    _require_names(read, source, conditions, axes)
     others = [read.headings[name] for name in outputs if name in read and name != output]
     for name in outputs.keys() - {output}:
         read.pop(name, None)
@@ -226,7 +236,7 @@ def notes(table: DataFile, model: str, outputs: Sequence[str], series: Sequence[
 
 
 def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
-    conditions, outputs, _ = _of_series(model, (found.output,), series)
+    conditions, outputs, *_ = _of_series(model, (found.output,), series)
     units = conditions | outputs
     errors = "errors estimated by the fit"
     if found.errors is not None:
@@ -274,16 +284,22 @@ def _unknown(measured: Measured, series: Series) -> list[str]:
 
 def _of_series(
     name: str, outputs: Sequence[str], series: Series
-) -> tuple[dict[str, str], dict[str, str], dict[str, ArrayLike]]:
-    """Return the units of conditions and outputs of a series, and the values of its numerical axes."""
+) -> tuple[dict[str, str], dict[str, str], dict[str, ArrayLike], dict[str, tuple[str, ...]]]:
+    """Return the units of conditions and outputs of a series, the values of its axes and coordinates, and the
+    coordinates of each output.
+    """
     model = models.load(name)
     special = model.units(series.parameters)
     conditions = {key: unit for key, (_, unit, _) in numbers_of(series.parameters).items()}
-    conditions |= {key: each.unit for key, each in model.coordinates(series.parameters).items()}
+    coordinates = model.coordinates(series.parameters)
+    conditions |= {key: each.unit for key, each in coordinates.items()}
     conditions |= {axis.name: axis.unit for axis in series.axes if axis.unit is not None}
+    axes: dict[str, ArrayLike] = {key: each.values for key, each in coordinates.items()}
+    axes |= {axis.name: axis.values for axis in series.axes if axis.unit is not None}
     declared = {each.name: each.unit for each in model.outputs if each.name in outputs}
     return (
         {key: special.get(key, unit) for key, unit in conditions.items()},
         {key: special.get(key, unit) for key, unit in declared.items()},
-        {axis.name: axis.values for axis in series.axes if axis.unit is not None},
+        axes,
+        {each.name: each.dims for each in model.outputs},
     )

@@ -81,10 +81,15 @@ def _print_aligned(answer: Table, limit: int, join: bool) -> None:
 
 
 def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
+    from mdr_dask.aggregation import BIASED
+
     columns = {str(name): frame[name].tolist() for name in frame}
     note = ""
     if join:
         columns, note = _joined(columns)
+        states = zip(columns.get("status", []), columns.get("realisations", []), strict=False)
+        if any("failed" in state and count for state, count in states):
+            note = "; ".join(filter(None, [note, f"failed realisations: {BIASED}"]))
     units = answer.units
     titles = [titled(name, units[name] if name in units else units[f"{name}_mean"]) for name in columns]
     print_aligned(titles, list(columns.values()), answer.keys, note)

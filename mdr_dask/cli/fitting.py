@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,9 +30,12 @@ from mdr_dask.cli.printing import (
     with_intervals,
 )
 from mdr_dask.cli.results import Reading, require_known, store_argument
+from mdr_dask.errors import FitError
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mdr_dask.fits.base import Fit
 
 
 class Asking(Drawing, Reading):
@@ -77,7 +81,6 @@ def fit(
     """
     from mdr_dask import fits as room
     from mdr_dask import store as stores
-    from mdr_dask.errors import FitError
     from mdr_dask.fits.calibration import with_table
     from mdr_dask.questions import selection
 
@@ -98,25 +101,32 @@ def fit(
     groups = selection.select_all(groups, selections, tell)
     if measured is not None:
         groups = with_table(groups, measured)
-    refused = []
-    for name in names:
-        try:
-            found = known[name].results(groups)
-        except FitError as error:
-            refused.append(f"{name}: {error}")
-            continue
-        for group, result in found.items():
-            if (len(names) > 1 or len(found) > 1) and not form:
-                say(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
-            _print(result, group, form, limit)
-    if refused:
-        raise FitError("\n".join(refused))
+    for note in dict.fromkeys(note for data in groups.values() for note in data.attrs.get("notes", [])):
+        tell(note)
+    _print_fits({name: known[name] for name in names}, groups, form, limit)
     if figure is not None:
         from mdr_dask.plots import available
         from mdr_dask.plots.base import provenance
 
         drawn = available(model)["calibration"]
         save(lambda: drawn.describe(groups), figure, provenance("calibration", [store], context.meta[COMMAND]), look)
+
+
+def _print_fits(fits: Mapping[str, Fit], groups: Mapping[str, xr.Dataset], form: str | None, limit: int) -> None:
+    """Print the results of all fits that succeed. Then raise FitError with the names of the fits that were refused."""
+    refused = []
+    for name, fit in fits.items():
+        try:
+            found = fit.results(groups)
+        except FitError as error:
+            refused.append(f"{name}: {error}")
+            continue
+        for group, result in found.items():
+            if (len(fits) > 1 or len(found) > 1) and not form:
+                say(f"{group + ': ' if group else ''}{name}: {fit.summary}")
+            _print(result, group, form, limit)
+    if refused:
+        raise FitError("\n".join(refused))
 
 
 def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None:
@@ -200,5 +210,7 @@ def _sentences(attributes: dict[str, object]) -> list[str]:
             f"{attributes['left_out']} of {attributes['cases']} cases are left out, because they have no value"
         )
     if attributes["realisations"] == 1:
-        sentences.append("with one realisation, the scatter of samples counts as an interaction of parameters")
+        sentences.append(
+            "with one realisation, scatter between samples, if there is any, counts as an interaction of parameters"
+        )
     return [*sentences, str(attributes["advice"])]

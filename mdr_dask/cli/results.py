@@ -55,6 +55,7 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
     mdr-dask status results/quickstart.zarr --failures
     """
     from mdr_dask import store as stores
+    from mdr_dask.aggregation import BIASED, has_biased_means
     from mdr_dask.questions import progress
 
     if not (failures or messages):
@@ -73,6 +74,8 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
     for group in progress.grouped(found, studies):
         say(f"{group.series + ': ' if group.series else ''}{group.results} x {group.kind}: {group.reason}")
         say(f"    {group.cases}")
+    if any(has_biased_means(data["status"]) for data in studies.values()):
+        say(f"failed realisations: {BIASED}")
     if not found:
         click.echo("no failures" if not messages else "no messages")
 

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import chdtri
 
+from mdr_dask import models
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign.measured import ZERO, Measured, read_measured, scatter
 from mdr_dask.errors import DataError, FitError
@@ -228,7 +229,9 @@ def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
     }
     varied = {axis["name"] for axis in dataset.attrs.get("axes", ())}  # a selection may have left one value of an axis
     axes = {name: dataset[name].to_numpy() for name in conditions if dataset[name].ndim or name in varied}
-    return read_measured(table["text"], table["name"], conditions, outputs, axes, wanted)
+    declared = models.load(dataset.attrs["model"]).outputs if "model" in dataset.attrs else ()
+    dims = {each.name: each.dims for each in declared}
+    return read_measured(table["text"], table["name"], conditions, outputs, axes, dims, wanted)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from mdr_dask import store
+from mdr_dask.aggregation import BIASED, has_biased_means
 from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.models.base import Status
-from mdr_dask.plots import labels, page
+from mdr_dask.plots import curves, labels, page
 from mdr_dask.plots.figure import Figure
 from mdr_dask.version import __version__
 
@@ -47,6 +48,9 @@ class Plot:
                 raise
             problem = f"{type(error).__name__}: {error}"
             raise DataError(f"internal error in this figure; please report it with the campaign: {problem}") from error
+        fixed = [{str(name) for name in data.coords if data[name].ndim == 0} for data in groups.values()]
+        idle = [names.difference(curves.scalars(data)) for names, data in zip(fixed, groups.values(), strict=True)]
+        figure.unnamed = set.intersection(*idle)
         every = [data["status"] for data in groups.values() if "status" in data]
         figure.leave_out(_without_value(every if figure.states is None else figure.states))
         return figure
@@ -71,7 +75,10 @@ def _without_value(states: Sequence[xr.DataArray]) -> list[str]:
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in reasons.items()}
-    return [f"{count} of {total} results, because they {words}" for words, count in counts.items() if count]
+    found = [f"{count} of {total} results, because they {words}" for words, count in counts.items() if count]
+    if any(map(has_biased_means, states)):
+        found[0] += f"; {BIASED}"
+    return found
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:

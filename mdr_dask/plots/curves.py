@@ -54,13 +54,18 @@ def mean(data: xr.Dataset, output: str) -> Mean:
     return Mean(*map(how.of, aggregation.mean_and_ends(values, error)))
 
 
+def intervals(most: int) -> str:
+    """Return the name of the intervals of values that are means over at most `most` realisations."""
+    return "95 % intervals of the mean" if most > 1 else "95 % intervals"
+
+
 def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
     """Return the text that explains bars and bands."""
     groups = [*data]
     most = max((each.sizes.get("realisation", 1) for each in groups), default=1)
     grid = any(aggregation.companion(each, name) is not None for each in groups for name in outputs if name in each)
-    parts = [f"scatter of up to {most} realisations"] * (most > 1) + ["error of the grid"] * grid
-    return f"bars: 95 % intervals, {' and '.join(parts)}" if parts else "one realisation: no bars"
+    parts = [f"the scatter of up to {most} realisations"] * (most > 1) + ["the error of the grid"] * grid
+    return f"bars and bands: {intervals(most)}, from {' and '.join(parts)}" if parts else "one realisation: no bars"
 
 
 def axes_of(data: xr.Dataset, output: str) -> list[str]:
@@ -190,10 +195,18 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters that have a single value in a series and that affect its results."""
-    requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
-    idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
+    """Return the parameters that have a single value in a series and are worth mentioning.
+
+    Parameters without effect are left out. Defaults are left out if they are zero or settings of the solution.
+    """
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
+    if "model" not in data.attrs:
+        return kept
+    declared = models.load(data.attrs["model"]).parameters
+    idle = {name for name, (other, value) in declared.requires.items() if value not in _given(data, other)}
+    defaults = {name: declared.model_fields[name].default for name in kept.keys() & declared.model_fields.keys()}
+    usual = {name for name, default in defaults.items() if kept[name].item() == default}
+    idle |= {name for name in usual if defaults[name] == 0 or name in declared.settings}
     return {name: value for name, value in kept.items() if name not in idle}
 
 

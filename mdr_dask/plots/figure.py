@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
@@ -12,6 +12,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
+from mdr_dask.units import shown
 
 #: Columns of the table of a figure: `FIRST` to the left of the columns of parameters, `LAST` to the right.
 FIRST = ("panel", "curve", "what")
@@ -105,8 +106,8 @@ class Trace:
         data, own = self.data, [str(name) for name in self.data.variables]
         rows: pd.DataFrame = (data if data.sizes else data.expand_dims("point")).to_dataframe().reset_index()[own]
         drawn = next(name for name in ("value", "y", "y_low", "x") if name in rows)
-        shown: pd.DataFrame = rows[np.isfinite(rows[drawn])]
-        return shown.assign(curve=plain(self.label), what=plain(self.what))
+        finite: pd.DataFrame = rows[np.isfinite(rows[drawn])]
+        return finite.assign(curve=plain(self.label), what=plain(self.what))
 
 
 @dataclass
@@ -147,6 +148,8 @@ class Figure:
     stack: int = 1
     ratio: float = 0.7
     share_y: bool = False
+    #: Names of fixed parameters that the caption leaves out (see `curves.scalars`).
+    unnamed: Collection[str] = ()
     #: States of the results that belong to the figure. None means all results of the series.
     states: Sequence[xr.DataArray] | None = None
 
@@ -173,9 +176,9 @@ class Figure:
         parameters = [name for name in whole if name not in (*FIRST, *LAST)]
         held = {name: whole[name].dropna().iloc[0] for name in parameters if whole[name].nunique() == 1}
         ends = [name for name in LAST if name in whole or name in ("x", "y")]
-        shown = whole.reindex(columns=[*FIRST, *(name for name in parameters if name not in held), *ends])
-        shown.attrs = {"held": held, "units": self.units()}
-        return shown
+        found = whole.reindex(columns=[*FIRST, *(name for name in parameters if name not in held), *ends])
+        found.attrs = {"held": held, "units": self.units()}
+        return found
 
     def units(self) -> dict[str, str]:
         """Return the units of all parameters."""
@@ -183,10 +186,10 @@ class Figure:
         return {str(name): str(value.attrs.get("units", "1")) for name, value in coords}
 
     def caption(self) -> list[str]:
-        """Return the lines for a caption: the title, all fixed parameters, what is not drawn, and warnings."""
+        """Return the lines for a caption: the title, the fixed parameters, what is not drawn, and warnings."""
         attrs = self.table().attrs
-        units, held = attrs["units"], attrs["held"].items()
-        fixed = [f"{name} = {_number(value)} {units[name]}".removesuffix(" 1") for name, value in held]
+        units, held = attrs["units"], attrs["held"]
+        fixed = [f"{name} = {_text(held[name], units[name])}" for name in held if name not in self.unnamed]
         lines = [f"title: {'; '.join(part for part in (self.subject, self.fixed, self.bars) if part)}"]
         lines += [f"held fixed: {', '.join(fixed)}"] * bool(fixed)
         return list(map(plain, [*lines, *self.remarks()]))
@@ -211,8 +214,8 @@ class Figure:
         return [plain(line) for line in lines]
 
 
-def _number(value: Any) -> str:
-    return f"{value:.12g}" if isinstance(value, int | float | np.number) else str(value)
+def _text(value: Any, unit: str) -> str:
+    return shown(float(value), unit, 12) if isinstance(value, int | float | np.number) else str(value)
 
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:

@@ -107,25 +107,24 @@ def _apart(measured: Measured, data: xr.Dataset, names: Sequence[str]) -> list[s
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> np.ndarray:
     """Add the measured points that belong to the curves of a panel, and return a mask of these points.
 
-    A point has the colour of its curve. Points are black if there is only one curve, or if the table lacks a parameter
-    in which the curves differ.
+    A point has the colour of its curve if it belongs to exactly one of several curves. Other points are black, for
+    example if the table lacks a parameter in which the curves differ.
     """
     curves = [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]
     if not curves:
         return np.zeros(measured.values.size, dtype=bool)
     keys, points = panel.entries(), _points(panel, measured, data)
-    differing = _differing([trace.data for trace in curves])
-    of_curves = len(curves) > 1 and differing <= {*measured.conditions, panel.x.quantity}
     can_be_shown = _on(panel.x, points["x"].to_numpy()) & _on(panel.y, points["y"].to_numpy())
-    left = can_be_shown.copy()
-    for trace in curves:
-        here = left & _at(trace.data, measured, data, panel.x.quantity)
+    on_curve = [can_be_shown & _at(trace.data, measured, data, panel.x.quantity) for trace in curves]
+    found: np.ndarray = np.any(on_curve, axis=0)
+    coloured = (np.sum(on_curve, axis=0) == 1) & (len(curves) > 1)
+    parts = [
+        (trace.colour, f"{NAME}, {trace.label}", here & coloured) for trace, here in zip(curves, on_curve, strict=True)
+    ]
+    for colour, name, here in [*parts, ("#000000", NAME, found & ~coloured)]:
         if here.any():
-            colour, name = (trace.colour, f"{NAME}, {trace.label}") if of_curves else ("#000000", NAME)
             own = points.isel(point=np.flatnonzero(here))
             panel.traces.append(Trace("curve", own, NAME, name, colour, "", "D", bars=True))
-            left &= ~here
-    found: np.ndarray = can_be_shown & ~left
     if found.any():
         label = NAME if measured.errors is None else f"{NAME}, 95 %"
         if len(curves) == 1 and not curves[0].label:
@@ -140,13 +139,6 @@ def _without_curve(panels: Sequence[Panel], measured: Measured, name: str) -> np
     drawn = [float(trace.data[name]) for trace in traces if name in trace.data.coords and trace.data[name].ndim == 0]
     values = measured.conditions[name]
     return np.isnan(belonging(values, drawn)) if drawn else np.zeros(values.size, dtype=bool)
-
-
-def _differing(curves: list[xr.Dataset]) -> set[str]:
-    """Return the names of the parameters whose values are not the same in all curves."""
-    held = [{str(name): value.item() for name, value in each.coords.items() if value.ndim == 0} for each in curves]
-    names = {name for each in held for name in each}
-    return {name for name in names if len({each.get(name) for each in held}) > 1}
 
 
 def _at(curve: xr.Dataset, measured: Measured, data: xr.Dataset, along: str) -> np.ndarray:

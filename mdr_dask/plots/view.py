@@ -449,6 +449,7 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     half = np.concatenate([np.ravel(value.high - value.low) / 2 for _, _, value in drawn])
     unit = labels.printed_unit(labels.quantity(output, drawn[0][1][output]).unit)
     if np.isfinite(half).any() and np.nanmax(half) > np.finfo(float).eps * np.nanmax(abs(every)):
-        figure.bars = f"95 % intervals: at most ±{np.nanmax(half):.2g} {unit}".rstrip()
+        most = max(data.sizes.get("realisation", 1) for _, data, _ in drawn)
+        figure.bars = f"{curves.intervals(most)}: at most ±{np.nanmax(half):.2g} {unit}".rstrip()
     figure.leave_out(left_out)
     return figure

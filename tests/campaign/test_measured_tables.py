@@ -174,3 +174,24 @@ def test_columns_that_resemble_fixed_parameters_are_only_named():
     assert found.remark == "not used: Ball Load, Pot force"
     with pytest.raises(DataError, match=r"(?s)Ball Load.*\n.*Pot force"):
         read_measured(text, "rig.csv", CONDITIONS, OUTPUTS, {"velocity": (1, 2), "normal_force": (100, 200)})
+
+
+PROFILES = {"wear_volume": (), "worn_depth": (), "worn_profile": ("radius",)}
+CYCLES = {"cycles": "1", "radius": "m"}
+WORN = {"wear_volume": "m^3", "worn_profile": "m"}
+
+
+@pytest.mark.parametrize("stored", [CYCLES, {"cycles": "1"}])
+def test_a_coordinate_of_other_outputs_is_refused(stored):
+    text = "cycles;radius [um];wear volume [um^3]\n1;5;0,3\n2;6;0,4\n"
+    with pytest.raises(DataError, match="column 'radius' is not used, because wear_volume does not depend on it"):
+        read_measured(text, "rig.csv", stored, WORN, {"cycles": (1, 2), "radius": (0, 1e-4)}, PROFILES)
+    profile = text.replace("wear volume [um^3]", "worn_profile [um]")
+    found = read_measured(profile, "rig.csv", CYCLES, WORN, {"cycles": (1, 2), "radius": (0, 1e-4)}, PROFILES)
+    assert set(found.conditions) == {"cycles", "radius"}
+
+
+def test_names_similar_to_a_coordinate_of_other_outputs_are_only_named():
+    text = "cycles;Narbenradius [um];wear volume [um^3]\n1;5;0,3\n2;6;0,4\n"
+    found = read_measured(text, "rig.csv", CYCLES, WORN, {"cycles": (1, 2), "radius": (0, 1e-4)}, PROFILES)
+    assert (found.remark, set(found.conditions)) == ("not used: Narbenradius", {"cycles"})

@@ -1,5 +1,6 @@
 """Fretting wear through the command line: units in the store, sharing of solutions, sliding, histories, bad input."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -8,6 +9,9 @@ import pytest
 import xarray as xr
 
 from mdr_dask.cli import main
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.wear import rules
+from mdr_dask.physics.wear.exact import exact
 
 STEEL = """\
   indenter: {shape: parabola, radius: 10 mm}
@@ -218,3 +222,34 @@ def test_impossible_contacts_are_failed_cases_with_a_sentence(write, capsys, par
     assert "0 done, 1 failed" in capsys.readouterr().out
     main(["status", "wear.zarr", "--failures"])
     assert message in capsys.readouterr().out
+
+
+def test_check_and_fit_state_the_error_of_the_fast_rule(write, capsys):
+    """The volumes in the note are those of the two rules."""
+    varied = "  stick_radius: 0.5\n  wear_rule: fast\n  cycles: {linear: [1, 2, 4]}\n  xi: {linear: [0.7, 0.9, 4]}\n"
+    path = write(varied, "outputs: [wear_volume]\n")
+    assert main(["check", str(path)]) == 0
+    note = capsys.readouterr().out
+    assert main(["run", str(path), "--quiet"]) == 0
+    capsys.readouterr()
+    Path("rig.csv").write_text("cycles,wear_volume\n1,0.1\n1.5,0.15\n2,0.2\n")
+    assert main(["fit", "wear.zarr", "calibration", "--measured", "rig.csv"]) == 0
+    assert capsys.readouterr().err.strip() in note
+    body = PowerProfile(2.0)
+    for percent, stick_radius in re.findall(r"(\d+) % (?:too small )?at (?:the stick radius )?([\d.]+) a0", note):
+        amounts = [0.25, 1.0, 2.0, 4.0]
+        worn = exact(body, float(stick_radius), amounts, errors=False)
+        fast = [rules.fast(body, float(stick_radius), amount) for amount in amounts]
+        ratios = [one.wear_volume / other.wear_volume for one, other in zip(fast, worn, strict=True)]
+        assert 100 * (1 - min(ratios)) == pytest.approx(float(percent), abs=1)
+
+
+def test_tables_of_means_state_that_failed_realisations_may_bias_them(write, capsys):
+    scattered = STEEL.replace("1 um", "1.9 um") + "  friction_scatter: 0.4\n  cycles: [1e3, 1e4]\n"
+    path = write(scattered + "  wear_rule: limit\n", "outputs: [wear_volume]\nrealisations: 12\n")
+    assert main(["run", str(path), "--quiet"]) == 1
+    capsys.readouterr()
+    for command in (["show", "wear.zarr"], ["status", "wear.zarr", "--failures"]):
+        assert main(command) == 0
+        printed = " ".join(capsys.readouterr().out.split())
+        assert "means over the other realisations of these cases may be biased" in printed

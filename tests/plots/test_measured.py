@@ -54,6 +54,19 @@ def test_a_column_that_may_contain_the_axis_of_a_selection_is_refused(groups, tm
         drawn(groups, tmp_path, "velocity [m/s],w [N],friction_coefficient\n0.01,0.1,2e-3\n0.02,1,5e-3\n")
 
 
+def test_points_that_belong_to_curves_of_several_series_are_black(tmp_path):
+    cycles = "  cycles: {geometric: [1, 8, 4]}\n  stick_radius: 0.5\n"
+    series = "series: {depth: {hold: depth}, force: {hold: force}}\n"
+    groups = planted.make(tmp_path, planted.FRETTING + cycles + series)
+    (tmp_path / "rig.csv").write_text("cycles,wear_volume\n1,1.1\n8,1.2\n")
+    figures = {"wear_growth": available("fretting_wear")["wear_growth"]}
+    given, figures = with_points(groups, figures, tmp_path / "rig.csv")
+    panel = figures["wear_growth"].describe(given).panels[0]
+    assert len([trace for trace in panel.traces if trace.what == "data"]) == 2
+    (points,) = (trace for trace in panel.traces if trace.what == "measured")
+    assert (points.colour, points.label, points.data["y"].size) == ("#000000", "measured", 2)
+
+
 def test_points_without_a_curve_are_counted_with_their_condition(groups, tmp_path):
     table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.01,7,5e-3\n"
     figure = drawn(groups, tmp_path, table)

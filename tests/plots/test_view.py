@@ -210,7 +210,7 @@ def test_the_figure_and_its_table_are_written(groups, tmp_path):
     assert list(read.columns) == ["panel", "curve", "what", "normal_force", "velocity", "x", "y", "y_low", "y_high"]
     pd.testing.assert_frame_equal(read, drawn.table(), check_dtype=False, check_exact=False)
     head = "".join(line for line in text.splitlines(True) if line.startswith("#"))
-    for part in ("# study: campaign study, sha256", "hurst = 0.7", "shear_modulus = 10000000 Pa", "velocity [m/s]"):
+    for part in ("# study: campaign study, sha256", "hurst = 0.7", "shear_modulus = 10 MPa", "velocity [m/s]"):
         assert part in head
     drawn.save(tmp_path / "mu.svg")  # its own table may be replaced
     (tmp_path / "mine.csv").write_text("a,b\n1,2\n")
@@ -258,7 +258,8 @@ def test_failed_results_of_cases_that_are_not_drawn_are_not_counted(groups, over
     status[{"normal_force": 1, "velocity": 3, "hurst": [0, 1], "realisation": 0}] = Status.FAILED.value
     view = {"by": "normal_force"} if over == "velocity" else {}
     figure = described({"": data.assign(status=status)}, MU, over, **view)
-    assert f"1 of {status.size // 2} results, because they failed" in figure.left_out
+    text = f"1 of {status.size // 2} results, because they failed; means over the other realisations of these cases"
+    assert any(each.startswith(text) for each in figure.left_out)
 
 
 def test_warnings_of_results_are_in_figure_and_table(groups):
@@ -268,9 +269,28 @@ def test_warnings_of_results_are_in_figure_and_table(groups):
     assert "warning: 3 results of the store: outside the range tested" in figure.head({})
 
 
+@pytest.mark.parametrize("over", ["velocity", ("velocity", "normal_force")])
+def test_intervals_of_means_are_called_so(groups, over):
+    few = {"": groups[""].isel(realisation=[0])}
+    for data, is_mean in ((groups, True), (few, False)):
+        bars = described(data, MU, over).bars
+        assert "95 % intervals" in bars
+        assert ("95 % intervals of the mean" in bars) == is_mean
+
+
 @pytest.mark.parametrize(("rule", "named"), [("exact", False), ("fast", True)])
 def test_a_title_leaves_out_a_parameter_without_effect(rule, named):
     attrs = {"model": "fretting_wear", "parameters": json.dumps({"wear_rule": rule})}
     assert ("xi" in curves.scalars(xr.Dataset(coords={"xi": 0.8, "stick_radius": 0.5}, attrs=attrs))) == named
     varied = {"wear_rule": ("wear_rule", ["exact", "fast"]), "xi": 0.8}
     assert "xi" in curves.scalars(xr.Dataset(coords=varied, attrs=attrs))
+
+
+def test_unused_defaults_are_not_mentioned():
+    attrs = {"model": "fretting_wear", "parameters": "{}"}
+    coords = {"cells": 200, "points": 50, "friction_scatter": 0.0, "amplitude_scatter": 0.1, "stick_radius": 0.5}
+    assert set(curves.scalars(xr.Dataset(coords=coords, attrs=attrs))) == {
+        "points",
+        "amplitude_scatter",
+        "stick_radius",
+    }

@@ -93,8 +93,9 @@ def _depth(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> float:
     depth = block.depth if block.depth is not None else grid.depth(image, float(block.force or 0.0))
     if image[-1] <= depth:
         raise ValueError(
-            f"at the depth {depth:.4g} the contact reaches beyond the table or grid, which ends at "
-            f"r = {grid.nodes[-1]:.4g} contact radii; lower the load or extend the table"
+            f"at the depth {depth:.4g} d0 the contact reaches beyond the last radius of the grid, "
+            f"{grid.nodes[-1]:.4g} a0: give fewer cycles, or `path` if the whole contact slips; if the body is a "
+            "table, the grid ends where the table ends, so extend the table"
         )
     return depth
 

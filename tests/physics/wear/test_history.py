@@ -81,5 +81,5 @@ def test_smaller_amplitude_after_a_larger_one_leaves_the_old_border_alone():
 
 
 def test_contact_beyond_the_grid():
-    with pytest.raises(ValueError, match="beyond the table or grid"):
+    with pytest.raises(ValueError, match=r"beyond the last radius of the grid, 1.2 a0: give fewer cycles, or `path`"):
         history(PARABOLA, [LoadBlock(1.0, 0.5, depth=2.0)], cells=40, reach=1.2)
