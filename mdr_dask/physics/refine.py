@@ -147,14 +147,15 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
     The largest change along a profile is divided by the largest absolute value of the profile, or by the floor of the
-    output if the floor is larger. The change is infinite unless the case has a solution on both grids.
+    output if the floor is larger. Positions at which one of the two profiles does not exist are ignored. The change is
+    infinite unless the case has a solution on both grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))
     with np.errstate(all="ignore"):
         for change, one, other in zip(changes, coarse.values, fine.values, strict=True):
             difference = np.abs(other - one)
-            difference[np.isnan(one) & np.isnan(other)] = 0.0
+            difference[(np.isnan(one) & np.isnan(other)) | ((difference.ndim > 1) & np.isnan(difference))] = 0.0
             change[:] = _largest(difference)
         changes = np.where(changes == 0, 0.0, changes / _sizes(fine.values, floors))
     return np.where(solved & ~np.isnan(changes), changes, np.inf)

@@ -22,24 +22,19 @@ from mdr_dask.models.fretting_wear.reduction import (
     reduce_block,
     table_profile,
 )
-from mdr_dask.models.parts.accuracy import missed_accuracy
+from mdr_dask.models.parts.accuracy import ACCURACY, missed_accuracy
 from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
 from mdr_dask.physics.wear import rules
-from mdr_dask.physics.wear.exact import COARSEST, exact
+from mdr_dask.physics.wear.accuracy import Checked, checked, checked_exact, checked_history
 from mdr_dask.physics.wear.exact import operations as exact_operations
-from mdr_dask.physics.wear.history import LoadBlock, history
-from mdr_dask.physics.wear.worn import Worn, virgin_load
+from mdr_dask.physics.wear.history import LoadBlock
+from mdr_dask.physics.wear.worn import virgin_load
 
 #: Quantities that `rules.limit_cases` and `rules.fast_cases` compute for many cases at once, and the stick border.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
 #: For each output that has another name in `Worn`, the name in `Worn`. The output `contact_force` cannot be called
 #: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force", "worn_profile": "height", "worn_image": "image"}
-#: Smallest tolerance that rounding allows. A tolerance limits the error of the worn profile, divided by eta d0.
-_FINEST = 1e-5
-#: The tolerance of the first solution is this factor times the accuracy. If the first solution misses the accuracy,
-#: the tolerance of each further solution is this factor times the tolerance of the solution before.
-_FINER = 0.25
 
 #: Indices (case, realisation) in a block.
 Places = list[tuple[int, int]]
@@ -88,12 +83,12 @@ def operations(block: Block[FrettingWear]) -> float:
         held = np.asarray((block.column("hold") == "force") == force)
         marched = held & np.asarray(force | (block.column("wear_rule") == "exact"))
         if marched.any():
-            solution = exact_operations(_first_resolution(block.accuracy), constant_force=force)
+            solution = exact_operations(block.accuracy or ACCURACY, constant_force=force)
             total += solution * _count(numbers.exponent[marched], numbers.level[marched])
         if held.any():
             every = numbers.exponent, numbers.level, numbers.cycles, numbers.xi
             total += of_profiles * _count(*(part[held] for part in every))
-    return 3 * total  # two more solutions for the errors
+    return 2 * total  # about as many for coarser solutions
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
@@ -207,8 +202,9 @@ def _solve_each(
                 status[position], messages[position] = kind, str(problem)
             continue
         solves += _solves_of(task, wanted)
-        for positions, (records, missed) in zip(wanted.values(), contacts, strict=True):
-            text = "; ".join(part for part in (missed, _cut_off(records, block, task.extent)) if part)
+        for positions, records in zip(wanted.values(), contacts, strict=True):
+            remarks = _missed(records, block, places), _cut_off(records, block, task.extent)
+            text = "; ".join(remark for remark in remarks if remark)
             for name, array in values.items():
                 answer = _answer(records, name, places)
                 for position in positions:
@@ -217,19 +213,19 @@ def _solve_each(
     return solves
 
 
-def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
+def _answer(records: Sequence[Checked], name: str, places: FloatArray) -> float | FloatArray:
     """Return one output of a solution. An output ``block_...`` has one row for each block of the load history."""
     plain, is_error = _plain_name(name)
-    answers = [
-        one.error(plain, places) if is_error else one.value(plain, places)
-        for one in (records if name.startswith("block_") else records[-1:])
-    ]
+    answers = []
+    for one in records if name.startswith("block_") else records[-1:]:
+        value = one.worn.value(plain, places)
+        answers.append(np.where(np.isfinite(value), one.errors[plain], np.nan) if is_error else value)
     return np.array(answers) if name.startswith("block_") else answers[0]
 
 
-def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float) -> str:
+def _cut_off(records: Sequence[Checked], block: Block[FrettingWear], extent: float) -> str:
     """Return a message if a requested profile ends inside the wear scar, or else an empty string."""
-    widest = max(one.contact_radius for one in records)
+    widest = max(one.worn.contact_radius for one in records)
     if widest <= extent or not any({"radius", "position"} & {*MODEL.output(name).dims} for name in block.outputs):
         return ""
     name = "extent" if block.parameters.last_radius is None else "last_radius"
@@ -238,7 +234,7 @@ def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float)
     )
 
 
-def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatArray) -> str:
+def _missed(records: Sequence[Checked], block: Block[FrettingWear], places: FloatArray) -> str:
     """Return a message about the outputs that miss the accuracy, or an empty string if there are no such outputs."""
     if block.accuracy is None:
         return ""
@@ -301,51 +297,33 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
     )
 
 
-def _first_resolution(accuracy: float | None) -> float:
-    """Return the tolerance of the first solution: the allowed error of the worn profile, divided by eta d0."""
-    return COARSEST if accuracy is None else max(_FINER * accuracy, _FINEST)
+def _judged(block: Block[FrettingWear]) -> set[str]:
+    """Return the quantities of `Worn` whose errors are stored or must meet the accuracy."""
+    return {
+        _plain_name(name)[0]
+        for name, companion in MODEL.companions.items()
+        if companion.name in block.outputs or (name in block.outputs and block.accuracy is not None)
+    }
 
 
 def _contacts(
     task: Task, wanted: Sequence[tuple[float, float]], block: Block[FrettingWear], places: FloatArray
-) -> list[tuple[Sequence[Worn], str]]:
+) -> list[list[Checked]]:
     """Solve a task for the pairs (N, xi) in `wanted`.
 
-    Return, for every pair, the contacts and a message. The message is empty unless outputs miss the accuracy.
-
-    A pair that misses the accuracy is solved again at a finer resolution. The final resolution of a pair does not
-    depend on the other pairs.
-    """
-    resolution, left = _first_resolution(block.accuracy), list(range(len(wanted)))
-    errors = block.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
-    found: dict[int, tuple[Sequence[Worn], str]] = {}
-    while left:
-        contacts = _solved(task, [wanted[number] for number in left], resolution, errors=errors)
-        for number, records in zip(left, contacts, strict=True):
-            found[number] = records, _missed(records, block, places)
-        refinable = task.rule != "fast" and not task.blocks and resolution > _FINEST
-        left = [number for number in left if found[number][1] and refinable]
-        resolution = max(_FINER * resolution, _FINEST)
-    return [found[number] for number in range(len(wanted))]
-
-
-def _solved(
-    task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
-) -> list[Sequence[Worn]]:
-    """Return the contacts for every pair (N, xi).
-
-    There is one contact for each block of a load history, or a single contact without a history.
+    Return the contacts of every pair: one for each block of a load history, or a single contact without a history.
     """
     profile, is_force = task.profile, task.hold == "force"
+    outputs = sorted(_judged(block))
     if task.blocks:
         deepest = 2.0 if is_force else max(block.depth or 1.0 for block in task.blocks)
         reach = min(1.7 * deepest, profile.largest_radius)
-        return [history(profile, task.blocks, cells=task.cells, reach=reach, errors=errors)] * len(wanted)
+        return [checked_history(profile, task.blocks, outputs, places, task.cells, reach)] * len(wanted)
     stick = profile.inside(task.level) if task.level > 0.0 else 0.0
     if task.rule == "fast":
         if is_force:
             raise ValueError(FAST_AT_DEPTH)
-        return [(rules.fast(profile, stick, cycles, xi),) for cycles, xi in wanted]
+        return [[checked(rules.fast(profile, stick, cycles, xi), outputs, places)] for cycles, xi in wanted]
     amounts = [np.inf if task.rule == "limit" else amount for amount, _ in wanted]
-    contacts = exact(profile, stick, amounts, accuracy, constant_force=is_force, errors=errors)
-    return [(contact,) for contact in contacts]
+    contacts = checked_exact(profile, stick, amounts, outputs, places, block.accuracy, constant_force=is_force)
+    return [[contact] for contact in contacts]

@@ -1,14 +1,9 @@
-"""Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force.
-
-The errors of a solution are estimated from the differences to two solutions with coarser panels and longer time steps.
-"""
+"""Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +12,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.wear.evolution import GROWTH, NotConvergedError, at, march, settled
-from mdr_dask.physics.wear.rules import limit, limit_radius
+from mdr_dask.physics.wear.evolution import GROWTH, at, march, settled
+from mdr_dask.physics.wear.rules import ERROR, limit, limit_radius
 from mdr_dask.physics.wear.slip import BORDER_WEIGHT, GrossSlip, Moment, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
     Scar,
@@ -27,34 +22,37 @@ from mdr_dask.physics.wear.worn import (
     check_stick_radius,
     closed,
     contact_pressure,
+    deepest,
     virgin_load,
     worn_by,
     worn_image,
     worn_volume,
 )
 
-COARSEST = 1e-3  # default and largest `accuracy`, chosen by trial: coarser panels do not resolve steep bodies
-COARSEST_OF_MOVING = 3e-4  # largest `accuracy` under constant force: longer steps could not follow the border
+COARSEST = 1.6e-2  # largest `accuracy`, chosen by trial: coarser panels do not resolve steep bodies
 #: If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
 #: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), and is then below the rounding error.
 ENDED = 1e4
 JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta in the panel next to the border exceeds this value
-ROUGHER = 4.0  # the error allowed in a time step grows by this factor from each solution to the next coarser solution
 
 
 class Resolution(NamedTuple):
-    """Panels and time steps for a given `accuracy`, which is the allowed error of the profile f divided by eta d0.
-
-    `rougher` is 0 for the requested solution, and 1 or 2 for the coarser solutions that are used to estimate errors.
-    """
+    """Panels and time steps for a given `accuracy`, which is the allowed error of the profile f divided by eta d0."""
 
     accuracy: float
-    rougher: int = 0
+
+    @property
+    def order(self) -> int:
+        """Number of nodes in a panel: one more for a quarter of the allowed error.
+
+        Panels far from border and edge are never halved.
+        """
+        return 2 + round(float(np.log(COARSEST / self.accuracy) / np.log(4.0)))
 
     @property
     def step(self) -> float:
         """The error allowed in a time step."""
-        return 0.2 * self.accuracy * ROUGHER**self.rougher
+        return 0.2 * self.accuracy
 
     @property
     def flat(self) -> float:
@@ -65,27 +63,23 @@ class Resolution(NamedTuple):
         """Return the panels for partial slip, halved `near` times more often at the stick border than at the edge."""
         digits = -np.log10(self.accuracy)
         levels = round(2.7 * digits - 3.3)
-        order = max(int(digits) + 1, 4)
-        left, right = (max(halvings - self.rougher, 0) for halvings in (levels + near, levels))
-        return graded_panels(left, right, order - min(self.rougher, 1))
+        return graded_panels(levels + near, levels, self.order)
 
     def panels_in_gross_slip(self, sharpness: float) -> Panels:
         """Return panels that resolve the pressure jump at the edge, and the tip of a sharp body (see `_slid`)."""
         digits = -np.log10(self.accuracy)
         # the error at the tip is the height of the profile within the innermost panel
-        tip = max(round(2.0 * digits) + 1 - self.rougher, 3.3 * digits - 2.2 - self.rougher)
-        edge = round(2.0 * digits) + 4 - self.rougher
-        return graded_panels(round(sharpness * tip), edge, 4 - min(self.rougher, 2))
+        tip = max(round(2.0 * digits) + 1, 3.3 * digits - 2.2)
+        return graded_panels(round(sharpness * tip), round(2.0 * digits) + 4, self.order)
 
 
 def exact(
     profile: Profile,
     stick_radius: float,
     amounts: Sequence[float],
-    accuracy: float = COARSEST,
+    accuracy: float = 1e-3,
     *,
     constant_force: bool = False,
-    errors: bool = True,
 ) -> list[Worn]:
     """Return the worn contact after each amount of wear, by the exact rule df/dN = p (f - f_star) / eta.
 
@@ -102,12 +96,10 @@ def exact(
         Cycles N >= 0 in units of N0, or, in gross slip, s = k E* l / (sigma0 a0) for the sliding distances l. The
         amounts may be in any order. An infinite value gives the limiting profile of partial slip.
     accuracy : float
-        Allowed error of f, divided by eta d0. The worn depth is of the order of eta d0. Errors below 3e-6 are not
+        Allowed error of f, divided by eta d0. The worn depth is of the order of eta d0. Errors below `ERROR` are not
         reached, because round-off accumulates over the time steps.
     constant_force : bool
         Whether the force of the virgin contact is kept constant instead of the depth.
-    errors : bool
-        Whether to estimate the errors. The estimate about doubles the computing time.
 
     Returns
     -------
@@ -128,29 +120,18 @@ def exact(
     >>> print(f"{few.wear_volume:.3f} {many.wear_volume:.3f}")
     0.131 0.759
     """
-    wanted = sorted({float(amount) for amount in amounts})
+    wanted, resolution = sorted({float(amount) for amount in amounts}), Resolution(min(accuracy, COARSEST))
     if stick_radius == 0.0:
-        solve: Callable[[Resolution], dict[float, Worn]] = partial(_slid, profile, wanted, constant_force)
+        contacts = _slid(profile, wanted, constant_force, resolution)
     else:
         check_stick_radius(stick_radius)
-        solve = partial(_fretted, profile, stick_radius, wanted, constant_force)
-    resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force and stick_radius > 0.0 else COARSEST))
-    found, rougher = solve(resolution), []
-    if errors:
-        rougher.append(solve(resolution._replace(rougher=1)))
-        # if the second coarser solution fails, the error is estimated from the first coarser solution only
-        with suppress(NotConvergedError):
-            rougher.append(solve(resolution._replace(rougher=2)))
-    contacts = {
-        amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
-        for amount, one in found.items()
-    }
+        contacts = _fretted(profile, stick_radius, wanted, constant_force, resolution)
     return [contacts[float(amount)] for amount in amounts]
 
 
 def operations(accuracy: float, *, constant_force: bool) -> float:
     """Return the approximate number of operations in partial slip, with n^3 operations per time step for n nodes."""
-    resolution = Resolution(min(accuracy, COARSEST_OF_MOVING if constant_force else COARSEST))
+    resolution = Resolution(min(accuracy, COARSEST))
     # time steps that grow by the factor `GROWTH`, plus time steps of a length limited by an error of third order
     steps = float(np.log(1.0 / resolution.step) / np.log(GROWTH) + resolution.step**-0.25)
     return (2.0 if constant_force else 1.0) * steps * resolution.panels(5 if constant_force else 2).nodes.size ** 3
@@ -296,10 +277,11 @@ def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -
         depth=depth,
         normal_force=2.0 * (virgin_load(profile, c) + eta * load),
         wear_volume=float(np.pi * square * (annulus + width * eta * panels.weights @ moment.accumulated)),
-        worn_depth=float(np.max(height(fine) - profile.height(fine))),
+        worn_depth=deepest(lambda r: height(r) - profile.height(r), fine),
         height=height,
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, a, depth, border),
+        relative_error=ERROR,
     )
 
 
@@ -321,7 +303,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     moments = march(problem, wanted[-1], resolution.step, resolution.step)
     # all solutions share an error: a point that the edge passes within a time step wears only after this step
     return {
-        path: replace(contact, least_errors={"contact_radius": resolution.accuracy * contact.contact_radius})
+        path: replace(contact, radius_error=resolution.accuracy * contact.contact_radius)
         for path, contact in ((path, _slid_contact(problem, at(problem, moments, path))) for path in wanted)
     }
 
@@ -350,8 +332,9 @@ def _slid_contact(problem: GrossSlip, moment: Moment) -> Worn:
         depth=float(image[-1]),
         normal_force=problem.normal_force(unknowns),
         wear_volume=float(volume),
-        worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
+        worn_depth=deepest(depths, a * np.sqrt(np.append(0.0, panels.nodes))),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
+        relative_error=ERROR,
     )

@@ -8,7 +8,7 @@ every earlier block.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,35 +32,13 @@ class LoadBlock:
     force: float | None = None
 
 
-def history(
-    profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0, errors: bool = True
-) -> list[Worn]:
+def history(profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0) -> list[Worn]:
     """Return the contact at the end of every block. The virgin body has the contact radius 1 at the depth 1.
 
     The error is about proportional to the cell width. After a block in which the image gets a jump, the error is about
-    proportional to the square root of the cell width. `reach` is the largest radius of the grid in units of a0. If
-    `errors` is True, the errors are estimated from two more solutions, with 1/2 and 1/4 of the cells.
+    proportional to the square root of the cell width. `reach` is the largest radius of the grid in units of a0.
     """
-    length = min(reach, profile.largest_radius)
-    fine, *rough = (
-        _run(profile, blocks, uniform_grid(number, length))
-        for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
-    )
-    # the stated errors of both radii are at least half a cell, because two grids may agree by chance
-    least = dict.fromkeys(("contact_radius", "stick_border"), 0.5 * length / cells)
-    return [replace(one, rougher=tuple(others), least_errors=least) for one, *others in zip(fine, *rough, strict=True)]
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    image: FloatArray
-    depth: float
-    pressure: FloatArray
-    slip: FloatArray
-    power: float
-
-
-def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> list[Worn]:
+    grid = uniform_grid(cells, min(reach, profile.largest_radius))
     image_0 = profile.image(grid.nodes)
     worn = np.zeros_like(image_0)
     records = []
@@ -120,4 +98,5 @@ def _record(grid: UniformGrid, profile: Profile, worn: FloatArray, image: FloatA
         height=lambda r: np.asarray(profile.height(r) + np.interp(r, grid.nodes, worn, right=0.0)),
         image=lambda x: np.asarray(np.interp(np.abs(x), grid.nodes, image, right=np.nan)),
         pressure=lambda r: np.asarray(np.interp(r, grid.nodes, pressure, right=0.0)),
+        radius_error=0.5 * grid.spacing,
     )

@@ -1,4 +1,4 @@
-"""The class `Worn` for a worn contact with its errors, and the integrals for profile, pressure and volume.
+"""The class `Worn` for a worn contact, and the integrals for profile, pressure and volume.
 
 The image g(x) is the MDR line of the profile f(r). Lengths are divided by a0, heights by d0, pressures by E* d0 / a0,
 volumes by a0^2 d0, and numbers of cycles by N0 = a0 sigma0 / (4 U0 k E*). Heights f are measured upwards from the
@@ -7,18 +7,21 @@ virgin apex. Wear increases f.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import Function, gauss
-from mdr_dask.physics.refine import CLOSE, EPS, SAFETY
+from mdr_dask.physics.refine import CLOSE, EPS
+
+#: Attributes of `Worn` that are functions of position.
+FUNCTIONS = ("height", "image", "pressure")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +40,10 @@ class Worn:
         Wear volume V, and the largest value of f - f0.
     height, image, pressure : callable, array -> array
         f(r), g(x) and p(r), for any position.
-    rougher : tuple of Worn
-        One or two coarser solutions of the same contact. The errors are estimated from the differences between this
-        solution and the coarser solutions.
-    least_errors : mapping of str to float
-        Lower limits of the stated errors, by name of the output, for radii that may agree in all solutions by chance.
     relative_error : float
-        Error of every output, divided by the largest value of the output. Only used if there is no coarser solution.
+        Known error of every attribute, divided by its largest value.
+    radius_error : float
+        Known error of both radii. Solutions of different resolution may agree within this error by chance.
     """
 
     contact_radius: float
@@ -55,34 +55,18 @@ class Worn:
     height: Function
     image: Function
     pressure: Function
-    rougher: tuple[Worn, ...] = ()
-    least_errors: Mapping[str, float] = field(default_factory=dict)
-    relative_error: float = np.nan
+    relative_error: float = 0.0
+    radius_error: float = 0.0
 
-    def value(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return an attribute by name. If the attribute is a function, return its values at the positions `places`."""
-        found = getattr(self, output)
-        return np.asarray(found(places)) if callable(found) else float(found)
+    def value(self, name: str, places: FloatArray) -> float | FloatArray:
+        """Return an attribute. If the attribute is a function, return its values at the positions `places`."""
+        found = getattr(self, name)
+        return np.asarray(found(places)) if name in FUNCTIONS else float(found)
 
-    def error(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the expected absolute error of an attribute, or NaN where the value is not finite.
-
-        The error of a function is one number. It follows from the largest difference between the solutions.
-        """
-        value = np.asarray(self.value(output, places))
-        if self.rougher:
-            # the largest difference may lie at a stick border, or between two of the positions
-            borders = [one.stick_border for one in (self, *self.rougher)]
-            points = np.concatenate([places, 0.5 * (places[1:] + places[:-1]), borders])
-            found = self.value(output, points)
-            with np.errstate(invalid="ignore"):
-                # the first coarser solution may agree by chance, so half the difference to the second counts as well
-                gaps = [np.abs(found - one.value(output, points)) / (k + 1) for k, one in enumerate(self.rougher)]
-            largest = float(np.max(gaps, initial=0.0, where=np.isfinite(gaps)))
-            error = max(SAFETY * largest, self.least_errors.get(output, 0.0))
-        else:
-            error = self.relative_error * float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value)))
-        return np.where(np.isfinite(value), error, np.nan)
+    def known_error(self, name: str) -> float:
+        """Return the known relative error of an attribute."""
+        is_radius = name in ("contact_radius", "stick_border") and getattr(self, name) > 0.0
+        return self.relative_error + (self.radius_error / float(getattr(self, name)) if is_radius else 0.0)
 
 
 class Scar(NamedTuple):
@@ -221,11 +205,20 @@ def worn_by(
         depth=depth,
         normal_force=normal_force,
         wear_volume=wear_volume,
-        worn_depth=float(np.max(worn_height(scar, slipping), initial=0.0)),
+        worn_depth=max(deepest(partial(worn_height, scar), slipping), 0.0),
         height=worn_profile(profile, scar),
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, edge, depth, border),
     )
+
+
+def deepest(depth: Function, places: FloatArray) -> float:
+    """Return the maximum of the worn depth. `places` are so dense that there is one maximum between neighbours."""
+    values = depth(places)
+    k = int(np.argmax(values))
+    bounds = places[max(k - 1, 0)], places[min(k + 1, places.size - 1)]
+    found = minimize_scalar(lambda r: -float(depth(np.array([r]))[0]), bounds=bounds, method="bounded")
+    return max(float(values[k]), -float(found.fun))
 
 
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:

@@ -1,5 +1,7 @@
 """The exact evolution against published figures, identities, its limits and the simulation of every cycle."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from references.literal_wear import literal
@@ -7,6 +9,7 @@ from references.literal_wear import literal
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.mdr.transforms import gauss, power_factor
 from mdr_dask.physics.wear import rules
+from mdr_dask.physics.wear.accuracy import checked_exact
 from mdr_dask.physics.wear.exact import exact
 
 PARABOLA = PowerProfile(2.0)
@@ -24,7 +27,7 @@ def worn(request):
 
 def test_checked_figures_at_constant_depth():
     """Figures on which independent solvers agree: 5e-6 in f, 1e-6 in a, 4e-6 in V."""
-    first, second = exact(PARABOLA, 0.455, [2.0, 8.0], accuracy=1e-5, errors=False)
+    first, second = exact(PARABOLA, 0.455, [2.0, 8.0], accuracy=1e-5)
     np.testing.assert_allclose(first.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=2e-6)
     assert first.contact_radius == pytest.approx(1.133353, abs=2e-5)  # converged in the next test
     assert first.wear_volume == pytest.approx(0.310754, abs=4e-6)
@@ -39,7 +42,7 @@ def test_convergence_under_constant_force():
     """Depth, border and volume at N = 8."""
     gaps = []
     for tolerance in (1e-3, 1e-4):
-        contact = exact(PARABOLA, 0.455, [8.0], tolerance, constant_force=True, errors=False)[0]
+        contact = exact(PARABOLA, 0.455, [8.0], tolerance, constant_force=True)[0]
         gaps.append(np.abs(np.array([contact.depth, contact.stick_border, contact.wear_volume]) - CONVERGED))
     assert np.all(gaps[0] > gaps[1])
     assert np.all(gaps[1] < [6e-6, 6e-6, 3e-5])
@@ -88,11 +91,11 @@ def test_image_at_border_and_edge(worn):
 
 def test_stated_errors_cover_the_distance_from_a_finer_solution(worn):
     under_force, contacts = worn
-    rough = exact(PARABOLA, 0.455, CYCLES[1:4], 1e-3, constant_force=under_force)
+    rough = checked_exact(PARABOLA, 0.455, CYCLES[1:4], ["height"], EVERYWHERE, constant_force=under_force)
     for contact, fine in zip(rough, contacts[1:4], strict=True):
-        error = contact.error("height", EVERYWHERE)
-        assert np.all(np.abs(contact.height(EVERYWHERE) - fine.height(EVERYWHERE)) <= error)
-        assert np.max(error) < 3e-2
+        error = contact.errors["height"]
+        assert np.all(np.abs(contact.worn.height(EVERYWHERE) - fine.height(EVERYWHERE)) <= error)
+        assert error < 3e-2
 
 
 @pytest.mark.parametrize(
@@ -101,7 +104,7 @@ def test_stated_errors_cover_the_distance_from_a_finer_solution(worn):
 )
 def test_after_many_cycles_the_contact_is_the_limit(exponent, c, constant_force):
     profile = PowerProfile(exponent)
-    last, limit, end = exact(profile, c, [1e3, np.inf, 1e12], 1e-3, constant_force=constant_force, errors=False)
+    last, limit, end = exact(profile, c, [1e3, np.inf, 1e12], 1e-3, constant_force=constant_force)
     assert end.wear_volume == limit.wear_volume
     assert last.depth == pytest.approx(limit.depth, rel=2e-4)
     assert last.contact_radius == pytest.approx(limit.contact_radius, rel=3e-4)
@@ -116,22 +119,23 @@ def test_after_many_cycles_the_contact_is_the_limit(exponent, c, constant_force)
 )
 @pytest.mark.parametrize("constant_force", [False, True])
 def test_sharp_and_steep_bodies_wear_at_every_resolution(exponent, c, cycles, constant_force):
-    (worn,) = exact(PowerProfile(exponent), c, [cycles], 1e-2, constant_force=constant_force)
-    assert len(worn.rougher) == 2
-    assert worn.error("wear_volume", RADII) < 0.05 * worn.wear_volume
+    (found,) = checked_exact(PowerProfile(exponent), c, [cycles], ["wear_volume"], RADII, constant_force=constant_force)
+    assert found.errors["wear_volume"] < 0.05 * found.worn.wear_volume
 
 
 def test_the_border_of_a_steep_body_leaves_its_first_place_with_the_first_wear():
     """It moves from .2 to .7 while the depth grows by 1e-6, and no step of the evolution resolves this."""
-    virgin, little, more = exact(PowerProfile(40.0), 0.2, [0.0, 1e-9, 1e-3], 1e-2, constant_force=True)
-    assert virgin.stick_border == pytest.approx(0.2)
-    for worn in (little, more):
+    virgin, little, more = checked_exact(
+        PowerProfile(40.0), 0.2, [0.0, 1e-9, 1e-3], ["stick_border"], RADII, constant_force=True
+    )
+    assert virgin.worn.stick_border == pytest.approx(0.2)
+    for worn, errors in (little, more):
         without_wear = (0.2**40.0 + worn.depth - 1.0) ** (1.0 / 40.0)
-        assert abs(worn.stick_border - without_wear) <= worn.error("stick_border", RADII) + 0.01
+        assert abs(worn.stick_border - without_wear) <= errors["stick_border"] + 0.01
 
 
 def test_the_limit_under_force_has_no_pressure_outside_its_stick_zone():
-    limit = exact(PARABOLA, 0.455, [np.inf], constant_force=True, errors=False)[0]
+    limit = exact(PARABOLA, 0.455, [np.inf], constant_force=True)[0]
     outside = np.linspace(limit.stick_border * 1.001, limit.contact_radius * 0.999, 20)
     np.testing.assert_allclose(limit.pressure(outside), 0.0, atol=1e-9)
     np.testing.assert_allclose(limit.image(outside), limit.depth, atol=1e-12)
@@ -146,7 +150,7 @@ def test_the_limit_under_force_has_no_pressure_outside_its_stick_zone():
 @pytest.mark.slow
 @pytest.mark.parametrize(("constant_force", "most"), [(False, 2e-3), (True, 3.5e-3)])
 def test_the_literal_simulation_tends_to_the_exact_evolution(constant_force, most):
-    reference = exact(PARABOLA, 0.455, [2.0], 1e-4, constant_force=constant_force, errors=False)[0]
+    reference = exact(PARABOLA, 0.455, [2.0], 1e-4, constant_force=constant_force)[0]
     errors = []
     for cells in (50, 100, 200):
         radii, height, depth = literal(PARABOLA, 0.455, 2.0, cells=cells, constant_force=constant_force)
@@ -160,7 +164,7 @@ def test_the_literal_simulation_tends_to_the_exact_evolution(constant_force, mos
 def test_table_of_a_parabola(constant_force):
     r = np.linspace(0, 3, 301)
     measured, formula = (
-        exact(body, 0.455, [2.0], 1e-3, constant_force=constant_force, errors=False)[0]
+        exact(body, 0.455, [2.0], 1e-3, constant_force=constant_force)[0]
         for body in (from_table(r, r**2 / 2, 1.0), PARABOLA)
     )
     np.testing.assert_allclose(measured.height(RADII), formula.height(RADII), atol=1e-4)
@@ -191,24 +195,23 @@ def test_a_measured_body_has_no_values_beyond_its_table(wears):
 def test_a_contact_that_grows_beyond_its_table_is_refused():
     r = np.linspace(0, 1.35, 136)
     body = from_table(r, r**2 / 2, 0.9)
-    assert exact(body, 0.455, [0.1], constant_force=True, errors=False)[0].contact_radius < body.largest_radius
+    assert exact(body, 0.455, [0.1], constant_force=True)[0].contact_radius < body.largest_radius
     for cycles in (20.0, np.inf):
         with pytest.raises(ValueError, match="the contact reaches beyond the table"):
-            exact(body, 0.455, [cycles], constant_force=True, errors=False)
+            exact(body, 0.455, [cycles], constant_force=True)
 
 
 @pytest.mark.parametrize("constant_force", [False, True])
 def test_a_result_does_not_depend_on_the_other_amounts(constant_force):
-    alone = exact(PARABOLA, 0.5, [1.3], constant_force=constant_force)[0]
-    among = exact(PARABOLA, 0.5, [9.0, 1.3, np.inf, 0.2], constant_force=constant_force)[1]
-    assert (alone.wear_volume, alone.depth) == (among.wear_volume, among.depth)
-    assert alone.error("wear_volume", RADII) == among.error("wear_volume", RADII)
+    solve = partial(checked_exact, PARABOLA, 0.5, outputs=["wear_volume"], places=RADII, constant_force=constant_force)
+    (alone, error), (among, other) = solve([1.3])[0], solve([9.0, 1.3, np.inf, 0.2])[1]
+    assert (alone.wear_volume, alone.depth, error) == (among.wear_volume, among.depth, other)
     np.testing.assert_array_equal(alone.height(RADII), among.height(RADII))
 
 
 @pytest.mark.parametrize(("exponent", "radius", "volume"), [(2.0, np.sqrt(2), np.pi), (1.0, np.pi / 2, np.pi**3 / 12)])
 def test_gross_slip_at_constant_depth_ends_in_the_free_body(exponent, radius, volume):
-    early, late = exact(PowerProfile(exponent), 0.0, [1.0, 30.0], accuracy=1e-4, errors=False)
+    early, late = exact(PowerProfile(exponent), 0.0, [1.0, 30.0], accuracy=1e-4)
     assert late.contact_radius == pytest.approx(radius, abs=1e-4)
     assert late.wear_volume == pytest.approx(volume, abs=1e-4)
     slid = 3.0 * (np.arange(2000) + 0.5) / 2000

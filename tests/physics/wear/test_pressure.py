@@ -27,12 +27,12 @@ def pressed(contact, edge):
 CONTACTS = {
     "limit": limit,
     "fast": lambda body, c: fast(body, c, 4.0),
-    "exact": lambda body, c: exact(body, c, [4.0], errors=False)[0],
-    "exact, late": lambda body, c: exact(body, c, [200.0], errors=False)[0],
-    "exact under force": lambda body, c: exact(body, c, [4.0], constant_force=True, errors=False)[0],
-    "limit under force": lambda body, c: exact(body, c, [np.inf], constant_force=True, errors=False)[0],
-    "gross slip": lambda body, c: exact(body, 0.0, [2.0], errors=False)[0],
-    "gross slip under force": lambda body, c: exact(body, 0.0, [2.0], constant_force=True, errors=False)[0],
+    "exact": lambda body, c: exact(body, c, [4.0])[0],
+    "exact, late": lambda body, c: exact(body, c, [200.0])[0],
+    "exact under force": lambda body, c: exact(body, c, [4.0], 3e-4, constant_force=True)[0],
+    "limit under force": lambda body, c: exact(body, c, [np.inf], constant_force=True)[0],
+    "gross slip": lambda body, c: exact(body, 0.0, [2.0])[0],
+    "gross slip under force": lambda body, c: exact(body, 0.0, [2.0], constant_force=True)[0],
 }
 
 
