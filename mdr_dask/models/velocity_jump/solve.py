@@ -100,7 +100,7 @@ def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
     is_simple = np.array([setting.terms is None and setting.body is None for setting in problems.settings] + [False])
     followed = np.where(is_jump & is_simple[problems.which], -1, np.arange(block.cases))
-    varied = [block.columns[name] for name in ("oversampling", "steps_per_decade") if name in block.columns]
+    varied = [column for name, column in block.columns.items() if name in VelocityJump.settings]
     for setting, members in problems.groups(followed, *varied):
         first = int(members[0])
         kind, case = _Marched if followed[first] < 0 else _Followed, block.case(first)
@@ -249,7 +249,8 @@ class _Followed(_Group):
             return Solution(values, np.array([found.outcome], np.int8))
 
         # The error of a depth below the rms height is divided by the rms height, which is 1 here.
-        refined = refine(solve, 1, grids, 0.0, order=2, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
+        accuracy, floors = self.block.accuracy or 0.0, [0.0, 0.0, 1.0, 0.0]
+        refined = refine(solve, 1, grids, accuracy, order=2, floors=floors, shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
         before, at = friction[:, 0], friction[:, 1]

@@ -111,6 +111,14 @@ def test_the_mean_strain_of_a_term_is_the_mean_displacement_in_steady_sliding(de
     assert state.terms.mean() == pytest.approx(state.displacement.mean(), rel=5e-3)
 
 
+def test_a_master_curve_over_many_decades_has_a_steady_state() -> None:
+    times = np.logspace(-15, 0, 20)
+    master = foundation(200 * np.exp(-((np.log10(times) + 8) ** 2) / 10), times, 0.0)
+    state, _, status = steady_start(periodic_line(*rough(32)), master, 1e4, 0.3)
+    assert status == Outcome.CONVERGED
+    assert state.displacement.mean() == pytest.approx(0.3, rel=1e-3)
+
+
 def test_contact_that_leaves_the_line_is_a_status() -> None:
     assert steady_start(bowl(100, 0.1), KELVIN, 0.05, 1.0)[2] == Outcome.OUTSIDE_LINE
     line = bowl(100)

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import CLOSE
+from mdr_dask.physics.sliding.viscoelastic import solve_sliding, static_depth, travelling
+from mdr_dask.physics.solids import LinearSolid
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
@@ -26,10 +28,7 @@ from mdr_dask.physics.transients.elements.foundation import (
     recover,
     release,
 )
-from mdr_dask.physics.transients.elements.steps import Edges, Schedule, State, follow_elements, mean_after, note_edges
-
-PERIODS = 3000  # largest number of periods of the line until the state of an element repeats
-LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at the start
+from mdr_dask.physics.transients.elements.steps import Edges, Schedule, State, follow_elements, note_edges
 
 
 class Response(NamedTuple):
@@ -57,30 +56,21 @@ def untouched(elements: int, terms: int) -> State:
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the state of the elements at the nodes in steady sliding, the depth, and the outcome.
 
-    One element is moved along the line in steps of half a cell, by the method of :func:`follow_line`, until the state
-    of the element repeats. The load that belongs to a depth is computed from the mean displacement. The depth is
-    varied until this load is the given load. At ``deborah = 0`` the elements are in equilibrium at rest under the load.
+    The solver of steady sliding finds the depth and, on a periodic line, the stretches of the Prony terms at the
+    highest node. One element is then moved along the line, by the method of :func:`follow_line`. Both use a line with
+    an additional node in the middle of every cell. At ``deborah = 0`` the elements are in equilibrium at rest under the
+    load.
     """
-    n, terms = line.height.size - 1, solid.times.size
-    state = untouched(n, terms)
-    carrier = _halved(line) if deborah > 0 else line
-    low = -float(carrier.height[:-1].max())
-
-    def excess(depth: float) -> float:
-        carried = _sliding(carrier, solid, state, deborah, depth) if deborah > 0 else _resting(line, state, depth)
-        return carried / load - 1
-
-    width = load
-    while (found := excess(low + width)) < 0:
-        low, width = low + width, 2 * width
-    if not np.isfinite(found):
-        return state, np.nan, Outcome.DEPTH_NOT_FOUND
-    depth = brentq(excess, low, low + width, xtol=1e-15 * width)
-    if not abs(excess(depth)) < LOAD_MISSED:
-        return state, depth, Outcome.DEPTH_NOT_FOUND
-    outside = not line.periodic and bool(state.touching[0] or state.touching[-1])
-    note_edges(solid, line, state, depth, deborah, load)
-    return state, depth, Outcome.OUTSIDE_LINE if outside else Outcome.CONVERGED
+    state, outcome = untouched(line.height.size - 1, solid.times.size), Outcome.CONVERGED
+    if deborah > 0:
+        depth, outcome = _slide(_halved(line), solid, deborah, load, state)
+    else:
+        depth = _rest(line, load, state)
+    if outcome == Outcome.CONVERGED:
+        note_edges(solid, line, state, depth, deborah, load)
+        if not line.periodic and (state.touching[0] or state.touching[-1]):
+            outcome = Outcome.OUTSIDE_LINE
+    return state, depth, outcome
 
 
 def _halved(line: CubicLine) -> CubicLine:
@@ -94,76 +84,74 @@ def _halved(line: CubicLine) -> CubicLine:
     return CubicLine(height, enter, leave, line.periodic, line.smooth)
 
 
-def _resting(line: CubicLine, state: State, depth: float) -> float:
-    """Write the state of all elements in equilibrium under a body at rest. Return the load."""
-    w = depth + line.height[:-1]
-    state.displacement[:] = np.maximum(w, 0)
+def _rest(line: CubicLine, load: float, state: State) -> float:
+    """Write the state of all elements in equilibrium under a body at rest. Return the depth."""
+    height = line.height[:-1]
+    depth = static_depth(height, load * height.size)
+    state.displacement[:] = np.maximum(depth + height, 0)
     state.terms[:] = state.displacement[:, None]
-    state.free[:] = 0.0
-    state.free_terms[:] = 0.0
-    state.touching[:] = w > 0
-    return float(state.displacement.mean())
+    state.touching[:] = depth + height > 0
+    return depth
 
 
-def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, depth: float) -> float:
-    """Write the steady state of all elements at a depth. Return the load that causes the mean displacement."""
-    if depth + line.height[:-1].max() <= 0:
-        return 0.0
-    n = state.displacement.size
-    good, last = _orbit(solid, line, deborah, depth, state)
-    if not good:
-        return np.nan
-    step, modes = 1 / (n * deborah), np.empty(solid.rates.size)
-    mean = float(state.displacement.mean()) + (0.0 if line.periodic else last / n)
-    without = mean_after(solid, state, 0.0, 0.0, step, modes)
-    return (mean - without) / (mean_after(solid, state, 1.0, 1.0, step, modes) - without)
+def _slide(line: CubicLine, solid: Foundation, deborah: float, load: float, state: State) -> tuple[float, Outcome]:
+    """Write the state of all elements in steady sliding. Return the depth and the outcome."""
+    cells, summit = line.height.size - 1, float(line.height.max())
+    first, height = 0, line.height
+    if line.periodic:
+        first = int(np.argmax(height))
+        height = np.roll(height[:-1], -first)
+        height = np.append(height, summit)
+    below = height - summit
+    sliding = travelling(LinearSolid(1.0, solid.moduli, solid.times * deborah, solid.viscosity * deborah), 1 / cells)
+    at_rest = static_depth(below[:-1], load * cells)
+    unknown = np.append(np.full(sliding.moduli.size, at_rest - load), at_rest)
+    outcome = Outcome(solve_sliding(below, load * cells, line.periodic, sliding, unknown, np.empty(6)))
+    depth, strains = float(unknown[-1]) - summit, np.zeros(solid.times.size)
+    if line.periodic:
+        strains[:] = unknown[-1]
+        slow = sliding.deborah > CLOSE  # the stretches of all other Prony terms of `solid` have relaxed
+        strains[strains.size - np.count_nonzero(slow) :] -= unknown[:-1][slow]
+    if outcome == Outcome.CONVERGED:
+        _pass_along(line, solid, deborah, depth, first, strains, state)
+    return depth, outcome
 
 
 @jit
-def _orbit(solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State) -> tuple[bool, float]:
-    """Move one element along the line at constant depth until the state repeats, and write the state of all elements.
+def _pass_along(
+    line: CubicLine, solid: Foundation, deborah: float, depth: float, first: int, strains: FloatArray, state: State
+) -> None:
+    """Move one element along the line at constant depth, and write the state of all elements.
 
-    Return whether the state repeats (always True if the line is not periodic), and the displacement of the element at
-    the end of the line.
+    At the node `first`, the dashpots of the Prony terms have the given `strains`. On a periodic line, the element is
+    moved along the line twice. Its state as a free element is known only after the first period.
     """
     n = line.height.size - 1
     # every k-th node belongs to an element, with k = `every`
     every, step = n // state.displacement.size, 1 / (n * deborah)
-    lapse, last = lapse_of(solid, step), np.zeros(solid.times.size)
-    terms, free_terms = np.zeros((1, last.size)), np.zeros((1, last.size))
-    top = int(np.argmax(line.height[:n])) if line.periodic else 0
-    u, free = max(depth + line.height[top], 0.0), 0.0
+    lapse = lapse_of(solid, step)
+    terms, free_terms = np.zeros((1, strains.size)), np.zeros((1, strains.size))
+    terms[0][:] = strains
+    u, free = max(depth + line.height[first], 0.0), 0.0
     touching = u > 0
-    for _ in range(PERIODS if line.periodic else 1):
-        last[:] = terms[0]
-        before = u
-        for cell in range(n):
-            i = (top + cell) % n
-            if not touching:
-                free = u
-                free_terms[0][:] = terms[0]
-            if i % every == 0:
-                j = i // every
-                state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                state.terms[j][:] = terms[0]
-                state.free_terms[j][:] = free_terms[0]
-            w0, w1 = depth + line.height[i], depth + line.height[i + 1]
-            part, leaves = 0.0, u
-            if touching:
-                rates = deborah * n * line.enter[i], deborah * n * line.leave[i]
-                part, leaves = release(solid, lapse, w0, w1, rates[0], rates[1], terms, 0)
-            after = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, terms, 0)
-            free = recover(solid, free, free_terms, 0, lapse.decay, lapse.modes)
-            u, touching = advance(solid, lapse, w0, w1, u, touching, part, leaves, after, terms, 0)
-        change = abs(u - before)
-        for m in range(terms.size):
-            change = max(change, abs(terms[0, m] - last[m]))
-        if line.periodic and change <= 1e-13 * abs(u):
-            return True, u
-        # the next sweep begins with the strains of a periodic state with this displacement
-        for m in range(terms.size):
-            terms[0, m] = last[m] - (terms[0, m] - last[m]) / np.expm1(-1 / (deborah * solid.times[m]))
-    return not line.periodic, u
+    for cell in range(2 * n if line.periodic else n):
+        i = (first + cell) % n
+        if not touching:
+            free = u
+            free_terms[0][:] = terms[0]
+        if i % every == 0:
+            j = i // every
+            state.displacement[j], state.touching[j], state.free[j] = u, touching, free
+            state.terms[j][:] = terms[0]
+            state.free_terms[j][:] = free_terms[0]
+        w0, w1 = depth + line.height[i], depth + line.height[i + 1]
+        part, leaves = 0.0, u
+        if touching:
+            rates = deborah * n * line.enter[i], deborah * n * line.leave[i]
+            part, leaves = release(solid, lapse, w0, w1, rates[0], rates[1], terms, 0)
+        after = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, terms, 0)
+        free = recover(solid, free, free_terms, 0, lapse.decay, lapse.modes)
+        u, touching = advance(solid, lapse, w0, w1, u, touching, part, leaves, after, terms, 0)
 
 
 def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: State, depth: float) -> Response:

@@ -105,10 +105,17 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 
 @jit_inline
-def _whole(values: FloatArray, j: int) -> float:
-    """Return the mean, over the cell before node j, of a cubic through the four nearest `values`."""
-    n = values.size
-    return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
+def _whole(values: FloatArray, is_smooth: BoolArray, j: int) -> float:
+    """Return the mean of `values` over the cell before node j, with the mean curvature at the two ends of the cell.
+
+    An end has a curvature if the values at both its neighbours are smooth (see `StepWorkspace`).
+    """
+    n, bend, ends = values.size, 0.0, 0
+    for i in (j - 1, j):
+        if is_smooth[i - 1] and is_smooth[(i + 1) % n]:
+            bend += values[i - 1] - 2 * values[i] + values[(i + 1) % n]
+            ends += 1
+    return float(0.5 * (values[j - 1] + values[j]) - bend / (12 * max(ends, 1)))
 
 
 @jit_inline
@@ -167,8 +174,8 @@ def _forces(state: State, workspace: StepWorkspace, first: int, keep: bool) -> t
         low, high = _cell(j, gaps, force, touching, edges, keep)
         width, middle = high - low, 0.5 * (low + high)
         if width >= 1:
-            load += _whole(force, j)
-            drag += _whole(power, j)
+            load += _whole(force, workspace.is_smooth, j)
+            drag += _whole(power, workspace.is_smooth, j)
             length += 1
         elif width > 0:
             rise, bend = force[j] - force[j - 1], slope[j] - slope[j - 1]
@@ -315,7 +322,8 @@ class StepWorkspace(NamedTuple):
     `leaves` are results of :func:`release`. `gaps` is depth + h minus the displacement that an element would have
     without contact. For a solid without a dashpot, `gaps` is a copy of `pulls`. `pulls` is the force of spring and
     Prony terms of an element that follows the line. `force` is the total force of this element, and `power` is the
-    product of total force and slope.
+    product of total force and slope. `is_smooth` is True for elements in contact, and for all elements of a solid
+    without Prony terms. With Prony terms, `force` has a kink at the edges of contact.
     """
 
     under: FloatArray
@@ -330,12 +338,14 @@ class StepWorkspace(NamedTuple):
     pulls: FloatArray
     force: FloatArray
     power: FloatArray
+    is_smooth: BoolArray
 
 
 @jit
 def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     a, terms = np.empty((11, n)), np.empty((n, solid.times.size))
-    return StepWorkspace(a[0], a[1], a[2], a[3], a[4], terms, a[5], a[6], a[7], a[8], a[9], a[10])
+    is_smooth = np.empty(n, np.bool_)
+    return StepWorkspace(a[0], a[1], a[2], a[3], a[4], terms, a[5], a[6], a[7], a[8], a[9], a[10], is_smooth)
 
 
 @jit
@@ -430,6 +440,7 @@ def forces_now(
         w = depth + workspace.under[j]
         pulls[j] = pull(solid, w, state.terms, j)
         gaps[j] = w - state.free[j] if solid.viscosity > 0 else pulls[j]
+        workspace.is_smooth[j] = state.touching[j] or solid.times.size == 0
     if solid.viscosity > 0:
         rate, drag, length = _carrying_rate(state, workspace, solid.viscosity, rate, drive)
         return depth, rate, drag, length
