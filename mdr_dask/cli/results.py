@@ -190,7 +190,7 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
     Interpolate the table linearly, with xarray or in your own program.
 
     \b
-    mdr-dask law results/quickstart.zarr friction_coefficient -o mu.nc
+    mdr-dask law results/quickstart.zarr friction_coefficient --select 'normal_force=1.5 N' -o mu.nc
     """
     from mdr_dask import store as stores
     from mdr_dask.fits.interpolant import law as table_of
