@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import mdr_dask
-from mdr_dask import execute, fits, models, units
+from mdr_dask import execute, fits, models, plots, units
 from mdr_dask.cli import main
 from mdr_dask.errors import MachineError, ModelError
 from mdr_dask.execute import Resources
@@ -147,6 +147,36 @@ def test_installed_packages_offer_models_and_fits_by_name(example, monkeypatch):
     monkeypatch.setattr(fits, "entry_points", lambda group: [Offered()])
     assert fits.available("wear_rate").keys() == {"archard", "calibration"}
     assert fits.available("wear_rate")["archard"] == law
+
+
+def test_a_fault_in_a_law_or_figure_of_ones_own_is_named_and_the_others_go_on(example, monkeypatch, capsys, caplog):
+    (example / "wear_laws.py").write_text(
+        "import xarray as xr\nfrom mdr_dask.fits.base import Fit\nfrom mdr_dask.plots.base import Plot\n"
+        "from mdr_dask.plots.figure import Axis, Figure, Panel, Trace\n\ndef wrong(groups):\n    return 1 / 0\n\n"
+        "def odd(groups):\n    trace = Trace('curve', xr.Dataset({'x': ('x', [1.0]), 'y': ('x', [1.0])}), marker='odd')\n"
+        "    return Figure([Panel(Axis('x'), Axis('y'), [trace])], 'y')\n\n"
+        "FITS = (Fit('wrong', ('wear_rate',), 'a law', wrong),)\n"
+        "PLOTS = (Plot('wrong', ('wear_rate',), 'a figure', wrong), Plot('odd', ('wear_rate',), 'a figure', odd))\n"
+    )
+    offers = {fits.GROUP: ["wear_laws:FITS", "absent_laws:FITS"], plots.GROUP: ["wear_laws:PLOTS", "absent:PLOTS"]}
+    installed = EntryPoint("wear_rate", "wear_rate:MODEL", models.GROUP)  # the campaign names it by its module
+    monkeypatch.setattr(models, "_installed", lambda: {"wear_rate": installed})
+    for room in (fits, plots):
+        monkeypatch.setattr(room, "entry_points", lambda group: [EntryPoint(o, o, group) for o in offers[group]])
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    assert main(["fit", "results/pin.zarr", "wrong"]) == 2
+    assert "law 'wrong' of the module wear_laws: ZeroDivisionError: division by zero (wear_laws.py:7)" in (
+        capsys.readouterr().err
+    )
+    assert main(["plot", "results/pin.zarr", "--all"]) == 2
+    told = capsys.readouterr().err
+    assert "wrong: left out: internal error in the figure 'wrong' of the module wear_laws: ZeroDivisionError" in told
+    assert "odd: left out: internal error in the figure 'odd' of the module wear_laws: ValueError" in told
+    assert main(["report", "results/pin.zarr"]) == 0
+    assert Path("report.html").read_text().count("of the module wear_laws") == 3
+    assert main(["plot", "results/pin.zarr", "wear_volume", "-o", "volume.png"]) == 0
+    assert "mdr_dask plots are left out: cannot load absent:PLOTS: ModuleNotFoundError" in caplog.text
+    del sys.modules["wear_laws"]
 
 
 def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written_too(example, capsys):

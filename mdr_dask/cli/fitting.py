@@ -28,17 +28,13 @@ from mdr_dask.cli.printing import (
     titled,
     with_intervals,
 )
-from mdr_dask.cli.results import Reading, require_known, store_argument
+from mdr_dask.cli.results import require_known, store_argument
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class Asking(Drawing, Reading):
-    """A command that reads a store and may draw a figure."""
-
-
-@click.command(cls=Asking)
+@click.command(cls=Drawing)
 @store_argument
 @click.argument("names", nargs=-1)
 @series_option
@@ -135,7 +131,7 @@ def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
 _ENDS = {"value": "", "95 % from": "_low", "to": "_high", "68 % from": "_low_68", "68 % to": "_high_68"}
 
 
-@click.command(cls=Asking)
+@click.command(cls=Drawing)
 @store_argument
 @click.argument("output")
 @series_option

@@ -20,8 +20,8 @@ from zarr.core.sync import sync
 from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import (
-    bytes_of,
     chunk_name,
+    chunks_of,
     digest,
     group_name,
     guarded,
@@ -91,7 +91,7 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return the current values of one output of a group. The order along each axis is the stored order."""
-    (held,) = _opened(url, series, bytes_of(url), [output]).values()
+    (held,) = _opened(url, series, chunks_of(url), [output]).values()
     with guarded(url, f"reading {output}"):
         return np.asarray(held[...])
 
@@ -113,7 +113,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     if found != layout:
         what = f"{here} finds another store or another layout" if found else f"not seen from {here}"
         raise StoreError(f"{url}: {what}; the workers need a shared file system or a URL")
-    return _opened(url, series, bytes_of(url))
+    return _opened(url, series, chunks_of(url))
 
 
 @lru_cache(maxsize=64)

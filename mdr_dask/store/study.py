@@ -17,7 +17,6 @@ from mdr_dask.store.files import (
     ROOT,
     digest,
     group_name,
-    guarded,
     local,
     parsed,
     read_bytes,
@@ -37,8 +36,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     content = read_bytes(url, "zarr.json")
     if content is None:
         return None
-    with guarded(url, "reading zarr.json"):
-        root = _checked(url, content)
+    root = _checked(url, content)
     if root is None:
         raise StoreError(f"{url}: zarr.json is damaged; 'mdr-dask verify {url}' names all faults")
     return group_of(root, group_name(series))
@@ -47,7 +45,10 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
     """Return the metadata of a study, or None if the metadata are unsafe or not in the record of the layout."""
-    root = parsed(content)
+    try:
+        root = parsed(content)
+    except ValueError:
+        return None
     if not isinstance(root, dict) or not isinstance(attributes := root.get("attributes", {}), dict):
         return None
     layout = attributes.get("mdr_dask_layout", LAYOUT + 1)
