@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -29,6 +29,7 @@ from mdr_dask.store.files import (
     with_digest,
     write_stages,
 )
+from mdr_dask.store.identity import block_digests
 from mdr_dask.store.locks import Lock, while_locked
 from mdr_dask.store.records import name_of
 from mdr_dask.store.study import array_of, document
@@ -71,7 +72,10 @@ def write_block(
     further = {name: arrays[name].ndim - len(place.index) for name in given}
     keys = {name: chunk_name(place.series, name, place.index, dims) for name, dims in further.items()}
     chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
-    line = with_digest({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
+    region = [[part.start, part.stop] for part in place.region]
+    of_block = {"region": region, "campaign": _digests(place.url, place.series, place.layout)(region)}
+    digests = {name: digest(content) for name, (_, content) in chunks.items()}
+    line = with_digest({**record, **of_block, "chunks": digests})
     ledger = dict([chunks.pop("status")])
     with while_locked(place.url, place.lock):
         write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])
@@ -127,6 +131,11 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
         larger = array_of({**array.metadata.to_dict(), "shape": shape}, memory, array.path)
         empty[name] = larger.with_config({"write_empty_chunks": True})
     return empty, encoded
+
+
+@lru_cache(maxsize=64)
+def _digests(url: str, series: str, layout: str) -> Callable[[Sequence[Sequence[int]]], str]:
+    return block_digests((document(url, series) or {})["attributes"])
 
 
 def layout_mark(url: str) -> str | None:
