@@ -71,7 +71,7 @@ def source_digest(name: str) -> str | None:
 
 def require_current(name: str) -> None:
     """Raise ModelError if the file of a user's model has changed since this Python process imported the model."""
-    if is_own(name) and _digest_at_import(load(name).compute) != source_digest(name):
+    if imported_digest(name) != source_digest(name):
         module = name.partition(":")[0]
         raise ModelError(
             f"the file of the model {name} has changed since this Python session imported it: restart Python, or call "
@@ -91,6 +91,11 @@ def _digest(compute: Callable[..., Any]) -> str | None:
 
 #: `_own` makes the first call, when a model is imported. Later calls return the cached digest.
 _digest_at_import = lru_cache(_digest)
+
+
+def imported_digest(name: str) -> str | None:
+    """Return the digest that the source file of a user's model had when this process imported the model."""
+    return _digest_at_import(load(name).compute) if is_own(name) else None
 
 
 def registered_name(name: str) -> str:
