@@ -103,7 +103,7 @@ def test_series_become_a_tree_and_are_named(tmp_path):
     assert sorted(tree.children) == ["flat", "rough"]
     assert tree["rough"].friction_coefficient.sizes["hurst"] == 2
     assert len(mdr_dask.table(tree, series="rough")) == 2
-    with pytest.raises(DataError, match="expected --series with one of rough, flat"):
+    with pytest.raises(DataError, match=r"expected --series \(in Python series=\) with one of rough, flat"):
         mdr_dask.aggregate(tree)
 
 
@@ -176,6 +176,10 @@ UNFIT = [
     ),
     (lambda study: mdr_dask.plot(xr.Dataset(), "velocity"), "expected a study as returned by run or open"),
     (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps"),
+    (
+        lambda study: mdr_dask.table(study.friction_coefficient),
+        "expected a study as returned by run or open, or its path, got DataArray",
+    ),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "the dimension 'realisation'"),
 ]
 
