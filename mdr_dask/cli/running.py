@@ -78,7 +78,9 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     about = {"campaign": str(campaign), "store": url, "part": options["part"]}
     with reporter(quiet) as report, telling(quiet, log, **about) as tell:
         progress = execute.run(study, url, resources, report, options["retry_failed"], part, tell)
-    _print_outcome(url if part is None else f"{url}, part {part}", url, progress, form)
+    what = url if part is None else f"{url}, part {part}"
+    what += " (unfinished: it needs results of other parts)" if progress.is_unfinished else ""
+    _print_outcome(what, url, progress, form)
     return 2 if progress.is_unfinished else 1 if progress.failed or progress.kept_failed else 0
 
 
