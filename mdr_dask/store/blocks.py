@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import zarr
 from numpy.typing import NDArray
-from zarr.abc.store import Store
 from zarr.core.buffer import Buffer
 from zarr.core.sync import sync
 
@@ -21,7 +20,6 @@ from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import (
     chunk_name,
-    chunks_of,
     digest,
     group_name,
     guarded,
@@ -32,7 +30,7 @@ from mdr_dask.store.files import (
 from mdr_dask.store.identity import block_digests
 from mdr_dask.store.locks import Lock, while_locked
 from mdr_dask.store.records import name_of
-from mdr_dask.store.study import array_of, document
+from mdr_dask.store.study import array_of, chunks_of, document
 
 
 @dataclass(frozen=True)
@@ -95,19 +93,20 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return the current values of one output of a group. The order along each axis is the stored order."""
-    (held,) = _opened(url, series, chunks_of(url), [output]).values()
+    (held,) = _opened(url, series, [output]).values()
     with guarded(url, f"reading {output}"):
         return np.asarray(held[...])
 
 
-def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
+def _opened(url: str, series: str, names: Iterable[str] = ()) -> dict[str, Any]:
     """Return the named arrays of a group, or the ledger and all outputs if no name is given."""
     held = document(url, series)
     if held is None:
         raise StoreError(f"{url}: this store, or one of its groups, has been removed")
     shown = held["consolidated_metadata"]["metadata"]
     wanted = names or ("status", *held["attributes"]["outputs"])
-    return {name: array_of(shown[name], store, group_name(series, name)) for name in wanted}
+    chunks = chunks_of(url)
+    return {name: array_of(shown[name], chunks, group_name(series, name)) for name in wanted}
 
 
 @lru_cache(maxsize=64)
@@ -117,7 +116,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     if found != layout:
         what = f"{here} finds another store or another layout" if found else f"not seen from {here}"
         raise StoreError(f"{url}: {what}; the workers need a shared file system or a URL")
-    return _opened(url, series, chunks_of(url))
+    return _opened(url, series)
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,6 @@ import hashlib
 import itertools
 import json
 import os
-import re
 import uuid
 from collections.abc import Awaitable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,9 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-import google_crc32c
 import zarr
-from zarr.abc.store import Store
 from zarr.core.buffer import default_buffer_prototype
 from zarr.core.sync import sync
 
@@ -79,34 +76,6 @@ def bytes_of(url: str) -> Any:
         return _RemoteStore.from_url(url)
     except (ImportError, ValueError) as error:
         raise StoreError(f"{url}: expected a path, or a URL that fsspec can open: {error}") from None
-
-
-class _Chunks(zarr.storage.WrapperStore[Store]):
-    """A Zarr store for reading arrays. Reading a damaged chunk raises StoreError with the name of the chunk."""
-
-    def __init__(self, store: Store, url: str) -> None:
-        super().__init__(store)
-        self._url = url
-
-    def _with_store(self, store: Store) -> _Chunks:
-        return _Chunks(store, self._url)
-
-    async def get(self, key: str, *arguments: Any, **options: Any) -> Any:
-        found = await super().get(key, *arguments, **options)
-        if found is not None and _CHUNK.search(key):
-            content = found.to_bytes()
-            # as the codec `crc32c` writes it
-            if google_crc32c.value(content[:-4]).to_bytes(4, "little") != content[-4:]:
-                raise StoreError(f"{self._url}: {key} is damaged; 'mdr-dask verify {self._url}' names all faults")
-        return found
-
-
-_CHUNK = re.compile(r"(^|/)c(/\d+)*$")
-
-
-def chunks_of(url: str) -> Store:
-    """Return the Zarr store at a path or URL, for reading arrays."""
-    return _Chunks(bytes_of(url), url)
 
 
 def absolute(url: str) -> str:

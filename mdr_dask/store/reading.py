@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
 from mdr_dask.models.numbers import entries_of
-from mdr_dask.store.files import chunks_of, group_name, read_json
+from mdr_dask.store.files import group_name, read_json
 from mdr_dask.store.integrity import is_safe
 from mdr_dask.store.ledgers import require_undamaged
-from mdr_dask.store.study import series_names
+from mdr_dask.store.study import chunks_of, series_names
 
 if TYPE_CHECKING:
     import xarray as xr
