@@ -47,6 +47,10 @@ class DataError(MdrDaskError):
     """A table, profile or selection that is invalid or incomplete."""
 
 
+class CodeError(DataError):
+    """A figure or law whose function has raised an unexpected exception."""
+
+
 class FitError(MdrDaskError):
     """A law that cannot be fitted to the data."""
 

@@ -430,8 +430,10 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
         found = {"": study}
     elif isinstance(study, xr.DataTree):
         found = {name: node.to_dataset() for name, node in study.children.items()} or {"": study.to_dataset()}
-    else:
+    elif isinstance(study, str | Path):
         return store.datasets(str(study))
+    else:
+        raise DataError(f"expected a study as returned by run or open, or its path, got {type(study).__name__}")
     for data in found.values():
         if "status" not in data or "realisation" not in data["status"].dims:
             kept = "with 'status' and the dimension 'realisation' (which isel(realisation=[0]) keeps)"

@@ -32,8 +32,8 @@ class Work:
 
     place: Place
     model: str
-    # Versions of the program and of the model in the process that started the run.
-    versions: tuple[str, int]
+    # What `versions` returns in the process that started the run.
+    versions: tuple[str, int, str | None]
     block: Block[Any]
     # Masks with the shape of the block. `wanted`: results to compute. `spared`: results to mark as not needed.
     wanted: NDArray[np.bool_]
@@ -72,13 +72,13 @@ class Outcome:
     warned: int = 0
 
 
-def versions(model: str) -> tuple[str, int]:
-    """Return the versions of the program and of the model."""
-    return __version__, models.load(model).version
+def versions(model: str) -> tuple[str, int, str | None]:
+    """Return the versions of the program and of the model, and a digest of the file of a user's model."""
+    return __version__, models.load(model).version, models.imported_digest(model)
 
 
 def run_block(work: Work) -> Outcome:
-    """Compute a block and write it; raise ClusterError if this worker has another version of the program."""
+    """Compute a block and write it; raise ClusterError if this worker has another version of program or model."""
     if versions(work.model) != work.versions:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
@@ -104,9 +104,11 @@ def run_block(work: Work) -> Outcome:
 
 def _other_version(work: Work) -> str:
     here, there = (
-        f"mdr_dask {program} with {work.model} {model}" for program, model in (versions(work.model), work.versions)
+        f"mdr_dask {program} with {work.model} {model}" + (f" (file {file})" if file else "")
+        for program, model, file in (versions(work.model), work.versions)
     )
-    return f"worker {platform.node()} has {here}, this program is {there}; install the same on both"
+    remedy = "install the same on both, and restart the workers"
+    return f"worker {platform.node()} has {here}, this program is {there}; {remedy}"
 
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
@@ -151,7 +153,8 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     """Return the result of a model that the user wrote, with invalid values marked as failed.
 
-    Raise TypeError or ValueError if the result lacks a declared output, or if a shape or a status is not as declared.
+    Raise TypeError or ValueError if the result lacks a declared output or has another output, or if a shape or a status
+    is not as declared.
     """
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")
@@ -166,9 +169,8 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     result = replace(result, status=status, messages=messages, solves=int(result.solves))
     if (status == Status.FAILED).all():
         return replace(result, values=unknown)
+    _require_declared(model, block, result)
     for name, empty in unknown.items():
-        if name not in result.values:
-            raise ValueError(f"the output {name!r} is missing")
         values[name] = real_numbers(name, result.values[name])
         if values[name].shape != empty.shape:
             expected, got = empty.shape[2:], values[name].shape[2:]
@@ -188,6 +190,16 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     for array in values.values():
         array[status == Status.FAILED] = np.nan
     return replace(result, values=values)
+
+
+def _require_declared(model: Model[Any], block: Block[Any], result: Result) -> None:
+    """Raise ValueError if a requested output is missing, or if an output is not declared."""
+    for name in block.outputs:
+        if name not in result.values:
+            raise ValueError(f"the output {name!r} is missing")
+    declared = {output.name for output in (*model.outputs, *model.companions.values())}
+    for name in result.values.keys() - declared:
+        raise ValueError(f"the output {name!r} is not declared, declared: {', '.join(sorted(declared))}")
 
 
 def _join(block: Block[Any], parts: list[Result]) -> Result:

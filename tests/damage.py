@@ -132,8 +132,7 @@ def same(one: dict[str, xr.Dataset] | None, other: dict[str, xr.Dataset] | None)
 def names_damage(act: Callable[[], object]) -> bool:
     """Say whether an act ends with an error that names damage."""
     try:
-        with store.readable("here"):
-            act()
+        act()
     except StoreError as error:
         return any(word in str(error) for word in ("damaged", "verify", "checksum", "failed"))
     return False

@@ -60,10 +60,10 @@ def test_an_error_in_one_figure_does_not_prevent_the_others(filled, capsys, monk
     broken = Plot("broken", ("sliding_friction",), "a figure with a fault", faulty)
     monkeypatch.setattr(plots, "available", lambda model: {"broken": broken, **known})
     capsys.readouterr()
-    assert main(["plot", filled, "--all", "-o", "drawn"]) == 0
+    assert main(["plot", filled, "--all", "-o", "drawn"]) == 2
     streams = capsys.readouterr()
     assert streams.out == "drawn/small-velocity.png\n"
-    assert "broken: left out: internal error in this figure" in streams.err
+    assert "broken: left out: internal error in the figure 'broken' of the module " in streams.err
     assert "Traceback" not in streams.err
     assert main(["plot", filled, "broken"]) != 0
     assert "Traceback" not in capsys.readouterr().err

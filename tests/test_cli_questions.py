@@ -126,7 +126,10 @@ def test_a_study_with_series_lists_them(tmp_path, capsys):
     )
     store = str(tmp_path / "study.zarr")
     assert main(["show", store]) == 2
-    assert capsys.readouterr().err == "expected --series with one of a, b, because this study has series\n"
+    assert (
+        capsys.readouterr().err
+        == "expected --series (in Python series=) with one of a, b, because this study has series\n"
+    )
     assert len(rows(output(capsys, "show", store, "rms_slope", "--series", "a").out)) == 2
 
 

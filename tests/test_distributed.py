@@ -69,7 +69,7 @@ def test_a_store_that_cannot_be_written_ends_a_distributed_run_with_one_error(to
 
 def test_a_task_of_another_version_is_refused_before_anything_is_written(toy, url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
-    monkeypatch.setattr(task, "versions", lambda _: ("0.0", 7))
+    monkeypatch.setattr(task, "versions", lambda _: ("0.0", 7, None))
     with pytest.raises(ClusterError, match=r"has mdr_dask 0\.0 with toy 7"):
         run(campaign, url)
     assert not digests(url).keys() & {"height/c/0/0", "status/c/0/0"}

@@ -3,7 +3,10 @@
 import importlib
 import json
 import re
+import subprocess
 import sys
+import time
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -13,9 +16,9 @@ import pytest
 import xarray as xr
 
 import mdr_dask
-from mdr_dask import execute, fits, models, units
+from mdr_dask import execute, fits, models, plots, task, units
 from mdr_dask.cli import main
-from mdr_dask.errors import MachineError, ModelError
+from mdr_dask.errors import ClusterError, MachineError, ModelError
 from mdr_dask.execute import Resources
 from mdr_dask.execute.children import children
 from mdr_dask.fits.base import Fit
@@ -74,7 +77,7 @@ def test_the_second_example_of_the_page_has_a_profile_and_a_data_file(example, c
     assert "in the module track, which is not included" in Path("track.html").read_text()
     (example / "p.csv").write_text("x,p\n0,0\n0.02,2e6\n")
     assert main(["run", "track.yaml", "--quiet"]) == 2
-    assert "pressure" in capsys.readouterr().err
+    assert "  pressure: p.csv has changed\n" in capsys.readouterr().err
     del sys.modules["track"]
 
 
@@ -149,6 +152,79 @@ def test_installed_packages_offer_models_and_fits_by_name(example, monkeypatch):
     assert fits.available("wear_rate")["archard"] == law
 
 
+def test_a_fault_in_a_law_or_figure_of_ones_own_is_named_and_the_others_go_on(example, monkeypatch, capsys, caplog):
+    (example / "wear_laws.py").write_text(
+        "import xarray as xr\nfrom mdr_dask.fits.base import Fit\nfrom mdr_dask.plots.base import Plot\n"
+        "from mdr_dask.plots.figure import Axis, Figure, Panel, Trace\n\ndef wrong(groups):\n    return 1 / 0\n\n"
+        "def odd(groups):\n    point = xr.Dataset({'x': ('x', [1.0]), 'y': ('x', [1.0])})\n"
+        "    trace = Trace('curve', point, marker='odd')\n"
+        "    return Figure([Panel(Axis('x'), Axis('y'), [trace])], 'y')\n\n"
+        "FITS = (Fit('wrong', ('wear_rate',), 'a law', wrong),)\n"
+        "PLOTS = (Plot('wrong', ('wear_rate',), 'a figure', wrong), Plot('odd', ('wear_rate',), 'a figure', odd))\n"
+    )
+    offers = {fits.GROUP: ["wear_laws:FITS", "absent_laws:FITS"], plots.GROUP: ["wear_laws:PLOTS", "absent:PLOTS"]}
+    installed = EntryPoint("wear_rate", "wear_rate:MODEL", models.GROUP)  # the campaign names it by its module
+    monkeypatch.setattr(models, "_installed", lambda: {"wear_rate": installed})
+    for room in (fits, plots):
+        monkeypatch.setattr(room, "entry_points", lambda group: [EntryPoint(o, o, group) for o in offers[group]])
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    assert main(["fit", "results/pin.zarr", "wrong"]) == 2
+    assert "law 'wrong' of the module wear_laws: ZeroDivisionError: division by zero (wear_laws.py:7)" in (
+        capsys.readouterr().err
+    )
+    assert main(["plot", "results/pin.zarr", "--all"]) == 2
+    told = capsys.readouterr().err
+    assert "wrong: left out: internal error in the figure 'wrong' of the module wear_laws: ZeroDivisionError" in told
+    assert "odd: left out: internal error in the figure 'odd' of the module wear_laws: ValueError" in told
+    assert main(["report", "results/pin.zarr"]) == 0
+    assert Path("report.html").read_text().count("of the module wear_laws") == 3
+    assert main(["plot", "results/pin.zarr", "wear_volume", "-o", "volume.png"]) == 0
+    assert "mdr_dask plots are left out: cannot load absent:PLOTS: ModuleNotFoundError" in caplog.text
+    del sys.modules["wear_laws"]
+
+
+def test_the_law_and_the_figure_of_the_page(example, monkeypatch, capsys):
+    (example / "wear_laws.py").write_text(re.search(r'^```python\n(""\"wear_laws.*?)^```', PAGE, flags=re.M | re.S)[1])
+    installed = EntryPoint("wear_rate", "wear_rate:MODEL", models.GROUP)
+    monkeypatch.setattr(models, "_installed", lambda: {"wear_rate": installed})
+    for room, offer in ((fits, "wear_laws:FITS"), (plots, "wear_laws:PLOTS")):
+        entry = EntryPoint("wear_rate", offer, room.GROUP)
+        monkeypatch.setattr(room, "entry_points", lambda group, entry=entry: [entry])
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["fit", "results/pin.zarr", "load_exponent", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rows"][0]["exponent"] == pytest.approx(1)
+    assert main(["plot", "results/pin.zarr", "growth", "-o", "growth.png"]) == 0
+    assert Path("growth.csv").read_text().count(" N,") == 10
+    del sys.modules["wear_laws"]
+
+
+def test_a_worker_with_another_file_of_the_model_is_refused(example, monkeypatch):
+    others = task.versions("wear_rate:MODEL")[:2]
+    monkeypatch.setattr(task, "versions", lambda _: (*others, "other"))
+    with pytest.raises(ClusterError, match=r"wear_rate:MODEL 1 \(file other\), this program is .* \(file [0-9a-f]+\)"):
+        execute.run(mdr_dask.read("pin.yaml"), "pin.zarr", Resources(threads=1), lambda _: None)
+
+
+@pytest.mark.slow
+def test_the_scheduler_needs_no_model_and_a_worker_without_it_is_named(example, tmp_path_factory):
+    """The scheduler runs in a process of its own, in another folder."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    words = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", "address.json"]
+    words += ["--no-dashboard"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", "address.json", "--no-nanny"]
+    with ExitStack() as stack:
+        for command in (words, worker):
+            process = subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL)
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            while not (folder / "address.json").exists():
+                time.sleep(0.1)
+        resources = Resources(scheduler=json.loads((folder / "address.json").read_text())["address"])
+        with pytest.raises(ClusterError, match="lacks the Python module 'wear_rate': install its package"):
+            execute.run(mdr_dask.read("pin.yaml"), "pin.zarr", resources, lambda _: None)
+
+
 def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written_too(example, capsys):
     traced = MODULE.replace(
         "has_error=True),)", 'has_error=True), Output("trace", "m", "depth along the track", ("place",)))'
@@ -196,6 +272,10 @@ MISBEHAVIOUR = {
         r"expected a dictionary with a value for each output, got None \(is the return statement missing\?\)",
     ),
     "other names": (lambda _: {"wear": 1.0}, "the output wear_volume is missing, got wear"),
+    "further output": (
+        lambda volume: {**gives(1.0)(volume), "depth": 1.0},
+        "ValueError: the output 'depth' is not declared, declared: wear_volume, wear_volume_error",
+    ),
     "exception": (raises(ValueError("two\n  lines\n")), r"ValueError: two lines \(test_own_model.py:\d+\)"),
     "exception that has no text": (raises(UnprintableError()), "UnprintableError"),
     "exit": (raises(SystemExit(0)), "SystemExit: 0"),

@@ -157,3 +157,11 @@ def test_log_and_status_of_parts(toy, campaign_file, capsys):
         assert capsys.readouterr().out.endswith("\nat work: 2 of 8 parts (2-3)\n")
         assert main(["status", "toy.zarr", "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["at_work"] == ["2 of 8 parts (2-3)"]
+
+
+def test_a_part_that_cannot_go_on_has_an_exit_code(toy, campaign_file, capsys):
+    text = CAMPAIGN.replace("realisations: 4", "realisations: {at_least: 4, at_most: 40, until: {height: 1 %}}")
+    Path("toy.yaml").write_text(text.replace(", fail_above: 2 m", ""))
+    assert main(["run", "toy.yaml", "--part", "1/2", "--quiet"]) == 2
+    assert "toy.zarr, part 1/2 (unfinished: it needs results of other parts): " in capsys.readouterr().out
+    assert main(["run", "toy.yaml", "--quiet"]) == 0

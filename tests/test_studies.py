@@ -1,6 +1,7 @@
 """Studies from Python: the same numbers and messages as the command line."""
 
 import io
+import shutil
 import sys
 import time
 from contextlib import contextmanager
@@ -103,7 +104,7 @@ def test_series_become_a_tree_and_are_named(tmp_path):
     assert sorted(tree.children) == ["flat", "rough"]
     assert tree["rough"].friction_coefficient.sizes["hurst"] == 2
     assert len(mdr_dask.table(tree, series="rough")) == 2
-    with pytest.raises(DataError, match="expected --series with one of rough, flat"):
+    with pytest.raises(DataError, match=r"expected --series \(in Python series=\) with one of rough, flat"):
         mdr_dask.aggregate(tree)
 
 
@@ -176,6 +177,10 @@ UNFIT = [
     ),
     (lambda study: mdr_dask.plot(xr.Dataset(), "velocity"), "expected a study as returned by run or open"),
     (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps"),
+    (
+        lambda study: mdr_dask.table(study.friction_coefficient),
+        "expected a study as returned by run or open, or its path, got DataArray",
+    ),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "the dimension 'realisation'"),
 ]
 
@@ -219,3 +224,22 @@ def test_a_run_in_a_notebook_moves_its_bar(monkeypatch):
         while not shown and time.monotonic() < end:
             time.sleep(0.01)
     assert 'value="4" max="10"' in shown[0]
+
+
+def test_a_damaged_chunk_is_named_where_python_reads_it(study, url, tmp_path):
+    damaged = tmp_path / "damaged.zarr"
+    shutil.copytree(url, damaged)
+    chunk = next(path for path in (damaged / "friction_coefficient/c").rglob("*") if path.is_file())
+    chunk.write_bytes(b"not what was written")
+    opened = mdr_dask.open(damaged)
+    for call in (
+        lambda: mdr_dask.table(opened),
+        lambda: mdr_dask.aggregate(opened).compute(),
+        lambda: mdr_dask.plot(opened, "velocity"),
+        lambda: opened.friction_coefficient.mean(),
+    ):
+        with pytest.raises(StoreError, match=r"friction_coefficient/c/.* is damaged; 'mdr-dask verify"):
+            call()
+    (damaged / "zarr.json").write_text("{")
+    with pytest.raises(StoreError, match=r"zarr\.json is damaged; 'mdr-dask verify"):
+        mdr_dask.open(damaged)

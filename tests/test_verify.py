@@ -2,6 +2,7 @@
 
 import json
 import random
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +14,10 @@ import zarr
 from test_execute import run
 from test_locks import late_task, small
 
-from mdr_dask import store
+from mdr_dask import execute, store
 from mdr_dask.cli import main
 from mdr_dask.errors import StoreError
+from mdr_dask.execute import Part, Resources
 from mdr_dask.store import locks
 from mdr_dask.store.files import with_digest
 from mdr_dask.store.integrity import read_record
@@ -218,3 +220,24 @@ def test_records_of_other_blocks_are_found(toy, url):
     store.repair(url)
     run(small(toy), url)
     assert [each.kind for each in store.verify(url).findings] == ["foreign"]
+
+
+def test_parts_of_different_campaigns_in_one_store_are_found(toy, tmp_path):
+    """A copy of one store over the other, with the metadata of the second campaign."""
+    first, second = (toy.campaign(toy.axis("position", range(1, 7)), slope=slope) for slope in (1.0, 2.0))
+    urls = [str(tmp_path / name) for name in ("first.zarr", "second.zarr")]
+    for number, (campaign, url) in enumerate(zip((first, second), urls, strict=True), start=1):
+        execute.run(campaign, url, Resources(threads=1), lambda _: None, part=Part(number, 2))
+    shutil.copytree(urls[1], urls[0], dirs_exist_ok=True)
+    url = urls[0]
+    found = store.verify(url)
+    assert {(each.kind, each.what.partition("block")[0]) for each in found.findings} == {
+        ("foreign", "contains the record of ")
+    }
+    with pytest.raises(StoreError, match="has results of another campaign; 'mdr-dask verify"):
+        execute.run(second, url, Resources(threads=1), lambda _: None)
+    store.repair(url)
+    execute.run(second, url, Resources(threads=1), lambda _: None)
+    assert store.verify(url).findings == []
+    execute.run(second, urls[1], Resources(threads=1), lambda _: None)
+    np.testing.assert_array_equal(store.values(url, "", "height"), store.values(urls[1], "", "height"))

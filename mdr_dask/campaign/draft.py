@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Iterator
 from typing import Any, Literal, get_args, get_origin
@@ -44,7 +45,7 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 
 def draft(name: str, model: Model[Any], file: str) -> str:
     """Return the text of a campaign file. The file passes every check, unless the model needs a data file."""
-    short = name.partition(":")[2].lower() if ":" in name else name
+    short = re.sub(r"[^A-Za-z0-9_]+", "_", model.name)
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
     head = _HEAD.format(summary=summary, file=file, name=short, model=name)
     wanted = [output.name for output in model.outputs if output.default]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from mdr_dask.plots.base import Plot
     from mdr_dask.plots.figure import Figure
+    from mdr_dask.plots.render import Drawn
 
 #: Options that apply only to figures of outputs, because the axes of a named figure are fixed.
 OF_OUTPUTS = ("over", "by", "panels", "log")
@@ -73,7 +74,7 @@ def plot(
     units: dict[str, str],
     look: dict[str, Any],
     **axes: Any,
-) -> None:
+) -> int:
     """Draw figures by name, or any output against any axis; without a name, list figures, outputs and axes.
 
     Without --over, an output is drawn against the axis with the most values. The data of every figure
@@ -89,21 +90,22 @@ def plot(
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --over normal_force -o map.png
     mdr-dask plot results/rubber.zarr velocity --measured rig.csv -o rig.pdf
     """
-    from mdr_dask.errors import DataError, FitError
+    from mdr_dask.errors import CodeError, DataError, FitError
     from mdr_dask.plots import page
     from mdr_dask.plots.base import provenance
+    from mdr_dask.plots.render import render
     from mdr_dask.questions import selection
-    from mdr_dask.store import readable
 
     urls, names = _split(words)
     asked = page.requested(**look, units=units)
     notes: dict[str, list[str]] = {}
-    with page.drawing_for(asked), readable(", ".join(urls)):
+    is_broken = False
+    with page.drawing_for(asked):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
         known = _known_to_all(urls, groups)
         if not names and not everything:
             _list(known, groups)
-            return
+            return 0
         figures = _requested(names, everything, known, groups, axes)
         places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
         require_known([*units], [str(name) for data in groups.values() for name in data.variables], "quantity")
@@ -121,19 +123,23 @@ def plot(
             origin |= {"warning": "; ".join(warnings)} if warnings else {}
             try:
                 description = figure.describe(groups)
+                description.leave_out([f"cases other than {where}"] * bool(where))
+                with figure.faults_named():
+                    drawn = render(description)
             except (DataError, FitError) as error:
                 if not everything:
                     raise
                 tell(f"{name}: left out: {error}")
+                is_broken |= isinstance(error, CodeError)
                 continue
-            description.leave_out([f"cases other than {where}"] * bool(where))
-            notes[path.name] = [*_save(description, path, origin), *(f"warning: {text}" for text in warnings)]
+            notes[path.name] = [*_save(drawn, path, origin), *(f"warning: {text}" for text in warnings)]
             click.echo(str(path))
     _tell_notes(notes)
     if warnings:
         tell(f"details of the warnings: mdr-dask status {urls[0]} --messages")
     if unused := units.keys() - asked.used:
         tell(f"--units {', '.join(sorted(unused))}: not shown in any figure that was drawn")
+    return 2 if is_broken else 0
 
 
 def _numbered(data: xr.Dataset) -> xr.Dataset:
@@ -219,7 +225,9 @@ def _requested(
     if given and (fixed := [name for name in names if name in known and name not in outputs]):
         raise click.UsageError(f"--{given[0]} needs an output; the axes of the figure {fixed[0]!r} are fixed")
     require_known(
-        of_outputs, outputs if given else [*known, *outputs], "output" if given else "store, figure or output"
+        of_outputs,
+        outputs if given else [*dict.fromkeys([*known, *outputs])],
+        "output" if given else "store, figure or output",
     )
     ending = f"-over-{'-'.join(axes['over'])}" if axes["over"] else ""
     return {
@@ -260,23 +268,23 @@ def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, x
 def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:
     """Draw a figure, write it and its table to files, and print the notes on the figure."""
     from mdr_dask.plots import page
+    from mdr_dask.plots.render import render
 
     with page.drawing_for(page.requested(**look)):
-        _tell_notes({path.name: _save(draw(), path, origin)})
+        _tell_notes({path.name: _save(render(draw()), path, origin)})
     tell(str(path))
 
 
-def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[str]:
+def _save(drawn: Drawn, path: Path, origin: Mapping[str, str]) -> list[str]:
     from mdr_dask.plots import labels, page, render
 
-    drawn = render.render(description)
     drawn.origin = origin
     with writing(render.table_beside(path)), writing(path):
         drawn.save(path)
     asked = page.current()
     if asked.title is not None or asked.width is not None:
-        return description.caption()
-    return [labels.plain(note) for note in description.remarks()]
+        return drawn.description.caption()
+    return [labels.plain(note) for note in drawn.description.remarks()]
 
 
 def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:

@@ -29,7 +29,7 @@ from mdr_dask.cli.printing import (
     titled,
     with_intervals,
 )
-from mdr_dask.cli.results import Reading, require_known, store_argument
+from mdr_dask.cli.results import require_known, store_argument
 from mdr_dask.errors import FitError
 
 if TYPE_CHECKING:
@@ -38,11 +38,7 @@ if TYPE_CHECKING:
     from mdr_dask.fits.base import Fit
 
 
-class Asking(Drawing, Reading):
-    """A command that reads a store and may draw a figure."""
-
-
-@click.command(cls=Asking)
+@click.command(cls=Drawing)
 @store_argument
 @click.argument("names", nargs=-1)
 @series_option
@@ -153,7 +149,7 @@ def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
 _ENDS = {"value": "", "95 % from": "_low", "to": "_high", "68 % from": "_low_68", "68 % to": "_high_68"}
 
 
-@click.command(cls=Asking)
+@click.command(cls=Drawing)
 @store_argument
 @click.argument("output")
 @series_option

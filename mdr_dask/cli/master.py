@@ -10,7 +10,6 @@ import click
 
 from mdr_dask.cli.options import csv_option, figure_options, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table, titled
-from mdr_dask.cli.results import Reading
 from mdr_dask.cli.writing import require_suffix, writing
 from mdr_dask.errors import DataError
 from mdr_dask.version import __version__
@@ -26,7 +25,7 @@ PARTS = ("factors", "curve", "points")
 """Parts of the result that can be printed: shift factors, the merged curve with its error, or all shifted points."""
 
 
-@click.command("master-curve", cls=Reading)
+@click.command("master-curve")
 @click.argument("source")
 @series_option
 @select_option

@@ -23,24 +23,12 @@ from mdr_dask.cli.options import (
 from mdr_dask.cli.printing import print_json, print_rows, say
 from mdr_dask.cli.writing import require_suffix, writing
 
-
-class Reading(click.Command):
-    """A command whose first argument is a store, or a table instead of a store."""
-
-    def invoke(self, context: click.Context) -> Any:
-        """Run the command. If a chunk of the store cannot be read, raise an error of one sentence."""
-        from mdr_dask.store import readable
-
-        with readable(context.params[str(self.params[0].name)]):
-            return super().invoke(context)
-
-
 STATISTICS = ("mean", "standard_deviation", "standard_error", "grid_error", "quantile", "interval", "count")
 
 store_argument = click.argument("store")
 
 
-@click.command(cls=Reading)
+@click.command()
 @store_argument
 @click.option(
     "--failures", is_flag=True, help="List failed results with their reasons and the ranges of their parameters."
@@ -90,7 +78,7 @@ def _print_counts(study: dict[str, Any], rows: list[dict[str, Any]], at_work: li
         click.echo(f"at work: {', '.join(at_work)}")
 
 
-@click.command(cls=Reading)
+@click.command()
 @store_argument
 @click.argument("outputs", nargs=-1, callback=listed)
 @click.option(
@@ -179,7 +167,7 @@ def show(
     click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
 
 
-@click.command(cls=Reading)
+@click.command()
 @store_argument
 @click.argument("output")
 @series_option
@@ -193,7 +181,7 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
     Interpolate the table linearly, with xarray or in your own program.
 
     \b
-    mdr-dask law results/quickstart.zarr friction_coefficient -o mu.nc
+    mdr-dask law results/quickstart.zarr friction_coefficient --select 'normal_force=1.5 N' -o mu.nc
     """
     from mdr_dask import store as stores
     from mdr_dask.fits.interpolant import law as table_of

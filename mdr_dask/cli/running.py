@@ -52,8 +52,9 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     """Run a campaign: compute all results that the store does not contain yet.
 
     After an interruption, give the same command again: finished results are kept, and only missing results are
-    computed. Exit code 0: all results are done; 1: some results have failed, in this run or in an earlier run; 2: the
-    run was refused or could not go on.
+    computed. Exit code 0: all results are done (with --part, those of this part); 1: some results have failed, in this
+    run or in an earlier run; 2: the run was refused, or could not go on, for example because a part needs results of
+    another part that is not running.
 
     \b
     mdr-dask run campaigns/quickstart.yaml
@@ -77,8 +78,10 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     about = {"campaign": str(campaign), "store": url, "part": options["part"]}
     with reporter(quiet) as report, telling(quiet, log, **about) as tell:
         progress = execute.run(study, url, resources, report, options["retry_failed"], part, tell)
-    _print_outcome(url if part is None else f"{url}, part {part}", url, progress, form)
-    return 1 if progress.failed or progress.kept_failed else 0
+    what = url if part is None else f"{url}, part {part}"
+    what += " (unfinished: it needs results of other parts)" if progress.is_unfinished else ""
+    _print_outcome(what, url, progress, form)
+    return 2 if progress.is_unfinished else 1 if progress.failed or progress.kept_failed else 0
 
 
 def _print_plan(study: Campaign, url: str, form: str | None) -> None:

@@ -54,6 +54,8 @@ class Progress:
     not_needed: int = 0
     # Number of failed results among `kept`.
     kept_failed: int = 0
+    # Whether this part has ended early, because it needs results of parts that are not running.
+    is_unfinished: bool = False
     # Number of results of this run that are done but have a warning.
     warned: int = 0
     # Number of blocks and number of solutions that this run has computed. Several results may share a solution.

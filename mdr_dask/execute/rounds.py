@@ -214,6 +214,7 @@ class _Run:
                     f"{what} that are not running: {_named(late - here, part)}; start these, then this part again"
                 )
                 self.tell(Event("round unfinished", {"parts": sorted(late - here)}, sentence))
+                self.progress = replace(self.progress, is_unfinished=True)
                 return False
             if time.monotonic() - reported > PAUSE:
                 reported = time.monotonic()

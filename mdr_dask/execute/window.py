@@ -13,6 +13,7 @@ from typing import Any
 from distributed import Client, Future, KilledWorker, get_worker
 from distributed.client import ClosedClientError
 from distributed.comm import CommClosedError
+from distributed.protocol.pickle import dumps, loads
 
 from mdr_dask.errors import LOOK, PAUSE, ClusterError, ModelError
 from mdr_dask.execute.children import Child, children, compute_apart
@@ -101,7 +102,8 @@ class TaskWindow:
             raise ClusterError(f"the scheduler went away; {KEPT}") from None
 
     def _submit(self, function: Callable[..., Outcomes], work: Work) -> None:
-        future = self._client.submit(function, work, self._case_timeout, pure=False)
+        # as bytes, because the scheduler would import the module of a user's model, and report no useful error
+        future = self._client.submit(function, dumps(work), self._case_timeout, pure=False)
         self._running[future] = work
         future.add_done_callback(self._ended.put)
 
@@ -152,25 +154,28 @@ def _outcomes(future: Future) -> Outcomes | None:
     except CancelledError:
         raise ClusterError(f"the scheduler went away; {KEPT}") from None
     except ModuleNotFoundError as error:
-        raise ClusterError(f"a worker lacks the Python module {error.name!r}; {KEPT}") from None
+        remedy = "install its package on the workers, or start them with its folder on PYTHONPATH"
+        raise ClusterError(f"a worker lacks the Python module {error.name!r}: {remedy}; {KEPT}") from None
     except (AttributeError, TypeError) as error:
         raise ClusterError(f"a worker has another version of mdr_dask: {error}; install the same on both") from None
     return outcomes
 
 
-def _run(work: Work, _: float | None) -> Outcomes:
+def _run(packed: bytes, _: float | None) -> Outcomes:
+    work = loads(packed)
     _report(work)
     one_blas_thread()
     return [(work, run_block(work))]
 
 
-def _run_apart(work: Work, limit: float | None) -> Outcomes:
+def _run_apart(packed: bytes, limit: float | None) -> Outcomes:
+    work = loads(packed)
     _report(work)
     try:
         with _APART:
             return list(compute_apart(_child(work.model), work, limit))
     except (ImportError, ModelError):  # the child process cannot import the model: compute here
-        return _run(work, limit)
+        return _run(packed, limit)
 
 
 def _report(work: Work) -> None:

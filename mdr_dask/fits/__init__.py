@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import entry_points
+from itertools import chain
 
+from mdr_dask import models
 from mdr_dask.fits.base import Fit
 
 #: The modules that have a tuple ``FITS``, and the models to whose stores the fits of each module apply. An empty tuple
@@ -26,7 +28,8 @@ GROUP = "mdr_dask.fits"
 
 def available(model: str) -> dict[str, Fit]:
     """Return the fits for stores of a model, indexed by name, including fits that other packages offer in `GROUP`."""
-    subjects = [subject for subject, models in SUBJECTS.items() if model in models or not models]
+    subjects = [subject for subject, about in SUBJECTS.items() if model in about or not about]
     own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in subjects)
-    others = (entry.load() for entry in entry_points(group=GROUP))
-    return {fit.name: fit for fits in (*own, *others) for fit in fits if model in fit.models or not fit.models}
+    every = chain(*own, models.offered(entry_points(group=GROUP)))
+    name = models.registered_name(model)
+    return {fit.name: fit for fit in every if name in fit.models or not fit.models}

@@ -7,15 +7,18 @@ sentence ``fitted_law_holds`` says whether the law holds with the fitted constan
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.errors import FitError
+from mdr_dask.errors import CodeError, FitError, MdrDaskError
+from mdr_dask.models.per_case import reason, where
 
 #: A law holds if the relative deviations of the data from the law are small: rms at most this value, and the largest
 #: deviation at most twice this value.
@@ -52,16 +55,34 @@ class Fit:
         FitError is raised only if no series can be fitted.
         """
         if not self.apart:
-            return {"": _judged(self.compute(groups))}
+            return {"": self._result(groups)}
         found, reasons = {}, []
         for name, dataset in groups.items():
             try:
-                found[name] = _judged(self.compute({name: dataset}))
+                found[name] = self._result({name: dataset})
             except FitError as error:
                 reasons.append(f"{name}: {error}" if name else str(error))
         if not found:
             raise FitError("; ".join(dict.fromkeys(reasons)))
         return found
+
+    def _result(self, groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
+        with faults_named(f"the law {self.name!r}", self.compute):
+            return _judged(self.compute(groups))
+
+
+@contextmanager
+def faults_named(what: str, function: Callable[..., Any]) -> Iterator[None]:
+    """Turn an unexpected exception of the function of a law or a figure into a CodeError that names its module."""
+    try:
+        yield
+    except (MdrDaskError, OSError):
+        raise
+    except Exception as error:
+        module = function.__module__
+        advice = "; please report it with the campaign" if module.startswith("mdr_dask.") else ""
+        text = f"internal error in {what} of the module {module}{advice}: {reason(error)}{where(error)}"
+        raise CodeError(text) from error
 
 
 def require(data: xr.Dataset, *names: str) -> None:

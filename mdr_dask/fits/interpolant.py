@@ -16,9 +16,9 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
 
     The mean over realisations is interpolated by monotone cubics (PCHIP) along one axis after the other. Each axis is
-    linear or logarithmic, as `Scale.of` chooses. An axis of words, or an axis with fewer than `FEWEST` numbers,
-    receives no new values. The error is the half width of the 95 % interval of the mean plus the error of
-    interpolation. The error of interpolation is estimated by leaving out every second value.
+    linear or logarithmic, as `Scale.of` chooses, and needs at least `FEWEST` values. An axis of words receives no new
+    values. The error is the half width of the 95 % interval of the mean plus the error of interpolation. The error of
+    interpolation is estimated by leaving out every second value.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -28,6 +28,9 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     axes = [str(dim) for dim in mean.dims if _is_numeric(mean, str(dim))]
     if not axes:
         raise FitError(f"expected an axis of at least {FEWEST} numbers, got none")
+    for axis in axes:
+        if (count := mean.sizes[axis]) < FEWEST:
+            raise FitError(f"{axis}: expected at least {FEWEST} values, got {count}; keep one by --select {axis}=VALUE")
     mean, half = (array.transpose(..., *axes) for array in (mean, half))
     grids = dict(zip(axes, dense([mean[axis].to_numpy() for axis in axes], mean.size), strict=True))
     places = {k - len(axes): mean[axis].to_numpy() for k, axis in enumerate(axes)}
@@ -97,7 +100,7 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
 
 
 def _is_numeric(mean: xr.DataArray, dim: str) -> bool:
-    return dim in mean.coords and mean[dim].dtype.kind in "fiu" and mean.sizes[dim] >= FEWEST
+    return dim in mean.coords and mean[dim].dtype.kind in "fiu"
 
 
 def _provenance(dataset: xr.Dataset) -> dict[str, str]:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
@@ -19,6 +20,8 @@ from typing import Any
 from mdr_dask.errors import ModelError
 from mdr_dask.models.base import Model
 from mdr_dask.models.per_case import reason
+
+log = logging.getLogger("mdr_dask.models")
 
 NAMES: tuple[str, ...] = (
     "sliding_friction",
@@ -68,7 +71,7 @@ def source_digest(name: str) -> str | None:
 
 def require_current(name: str) -> None:
     """Raise ModelError if the file of a user's model has changed since this Python process imported the model."""
-    if is_own(name) and _digest_at_import(load(name).compute) != source_digest(name):
+    if imported_digest(name) != source_digest(name):
         module = name.partition(":")[0]
         raise ModelError(
             f"the file of the model {name} has changed since this Python session imported it: restart Python, or call "
@@ -88,6 +91,30 @@ def _digest(compute: Callable[..., Any]) -> str | None:
 
 #: `_own` makes the first call, when a model is imported. Later calls return the cached digest.
 _digest_at_import = lru_cache(_digest)
+
+
+def imported_digest(name: str) -> str | None:
+    """Return the digest that the source file of a user's model had when this process imported the model."""
+    return _digest_at_import(load(name).compute) if is_own(name) else None
+
+
+def registered_name(name: str) -> str:
+    """Return the name under which a package registers a model, or `name` itself if no package registers the model."""
+    return next((known for known, entry in _installed().items() if entry.value == name), name)
+
+
+def offered(entries: Iterable[EntryPoint]) -> Iterator[Any]:
+    """Yield the fits or figures that other packages offer. If a module cannot be imported, log a warning."""
+    for entry in entries:
+        try:
+            yield from entry.load()
+        except Exception as error:
+            _warn_of_broken_module(entry.group, entry.value, reason(error))
+
+
+@lru_cache
+def _warn_of_broken_module(group: str, value: str, why: str) -> None:
+    log.warning("%s are left out: cannot load %s: %s", group.replace(".", " "), value, why)
 
 
 @lru_cache(maxsize=1)

@@ -36,8 +36,8 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     `solve` also returns this error, as ``<output>_error``.
 
     A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
-    real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A case also fails if an
-    error is negative.
+    declared, is not real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A case
+    also fails if an error is negative.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -45,6 +45,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         status = np.full(shape, Status.DONE, dtype=np.int8)
         found: dict[tuple[int, int], dict[str, NDArray[np.float64]]] = {}
         messages: dict[tuple[int, int], str] = {}
+        further: set[str] = set()
         streams = [random_stream(block.seed, realisation) for realisation in block.realisations]
         starts = [stream.bit_generator.state for stream in streams]
         for case in range(block.cases):
@@ -54,12 +55,15 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
                 try:
                     outputs = _limited(solve, parameters, stream)
                     found[case, number] = {name: _output(name, outputs) for name in block.outputs}
+                    further |= outputs.keys() - found[case, number].keys()
                 except BaseException as error:
                     if is_interrupt(error):
                         raise
                     status[case, number] = Status.FAILED
                     messages[case, number] = reason(error) + where(error)
-        values = {name: _gathered(name, found, shape) for name in block.outputs}
+        # further outputs are returned without values: the task refuses those that the model does not declare
+        values = dict.fromkeys(further, np.empty(0))
+        values |= {name: _gathered(name, found, shape) for name in block.outputs}
         return Result(values, status, messages, solves=status.size)
 
     compute.is_plain_python = True  # type: ignore[attr-defined]

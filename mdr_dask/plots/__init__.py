@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
+from itertools import chain
 from typing import TYPE_CHECKING
 
+from mdr_dask import models
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -25,8 +27,9 @@ GROUP = "mdr_dask.plots"
 def available(model: str) -> dict[str, Plot]:
     """Return the figures of a model, indexed by name, including the figures of other packages (see `GROUP`)."""
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
-    others = (entry.load() for entry in entry_points(group=GROUP))
-    return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}
+    every = chain(*own, models.offered(entry_points(group=GROUP)))
+    name = models.registered_name(model)
+    return {plot.name: plot for plot in every if name in plot.models or not plot.models}
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import xarray as xr
 
 from mdr_dask import store
 from mdr_dask.aggregation import BIASED, has_biased_means
-from mdr_dask.errors import DataError, MdrDaskError
+from mdr_dask.fits.base import faults_named
 from mdr_dask.models.base import Status
 from mdr_dask.plots import curves, labels, page
 from mdr_dask.plots.figure import Figure
@@ -38,28 +39,26 @@ class Plot:
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
         """Return the figure as data, and count the results that failed or are missing."""
-        try:
-            with page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
-                figure = self.draw({name: _squeezed(data) for name, data in groups.items()})
-        except MdrDaskError:
-            raise
-        except Exception as error:
-            if store.is_damage(error):
-                raise
-            problem = f"{type(error).__name__}: {error}"
-            raise DataError(f"internal error in this figure; please report it with the campaign: {problem}") from error
-        fixed = [{str(name) for name in data.coords if data[name].ndim == 0} for data in groups.values()]
-        idle = [names.difference(curves.scalars(data)) for names, data in zip(fixed, groups.values(), strict=True)]
-        figure.unnamed = set.intersection(*idle)
-        every = [data["status"] for data in groups.values() if "status" in data]
-        figure.leave_out(_without_value(every if figure.states is None else figure.states))
+        with self.faults_named(), page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
+            figure = self.draw({name: _squeezed(data) for name, data in groups.items()})
+            fixed = [{str(name) for name in data.coords if data[name].ndim == 0} for data in groups.values()]
+            idle = [names.difference(curves.scalars(data)) for names, data in zip(fixed, groups.values(), strict=True)]
+            figure.unnamed = set.intersection(*idle)
+            every = [data["status"] for data in groups.values() if "status" in data]
+            figure.leave_out(_without_value(every if figure.states is None else figure.states))
         return figure
+
+    def faults_named(self) -> AbstractContextManager[None]:
+        """Return a context that turns an unexpected exception of this figure into a CodeError."""
+        return faults_named(f"the figure {self.name!r}", self.draw)
 
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Drawn:
         """Draw the figure with matplotlib; raise the same errors as `describe`."""
         from mdr_dask.plots.render import render
 
-        drawn = render(self.describe(groups))
+        description = self.describe(groups)
+        with self.faults_named():
+            drawn = render(description)
         drawn.origin = origin_of(self.name, groups)
         return drawn
 

@@ -77,7 +77,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
-            raise DataError(f"expected --series with one of {names}, because this study has series")
+            raise DataError(f"expected --series (in Python series=) with one of {names}, because this study has series")
         return next(iter(datasets.values()))
     if series not in datasets:
         raise DataError(f"no series {series!r}; known: {names or 'none (leave out --series)'}")

@@ -67,34 +67,33 @@ def _asset(name: str) -> str:
 
 def _study(url: str) -> dict[str, Any]:
     """Return all that the template shows of a study."""
-    with store.readable(url):
-        held, groups, left_out = store.attributes(url), {}, []
-        whole = store.datasets(url)
-        for name, data in whole.items():
-            groups[name], texts = _thinned(data)
-            left_out += texts
-        records = [record for name in groups for record in store.records(url, name)]
-        messages = [message for name in groups for message in progress.messages(url, name, whole[name])]
-        counted, model = progress.counts(url), str(held["model"])
-        return {
-            "url": url,
-            "title": str(held["title"]),
-            "model": model,
-            "summary": _summary(model),
-            "at_work": ", ".join(store.active_runs(url)),
-            "facts": _facts(held, counted, records),
-            "counts": _counts(counted),
-            "groups": progress.grouped(messages, groups),
-            "notes": dict.fromkeys(note for data in groups.values() for note in data.attrs.get("notes", [])),
-            **_figures(url, model, groups, left_out),
-            **_laws(url, model, groups, bool(left_out)),
-            "outputs": [_outputs(name, data) for name, data in groups.items()],
-            "source": SOURCES.get(model),
-            "file": str(held.get("source") or "campaign.yaml"),
-            "campaign": str(held["campaign"]),
-            "parameters": [_parameters(name, data) for name, data in groups.items()],
-            "rerun": _rerun(url, held),
-        }
+    held, groups, left_out = store.attributes(url), {}, []
+    whole = store.datasets(url)
+    for name, data in whole.items():
+        groups[name], texts = _thinned(data)
+        left_out += texts
+    records = [record for name in groups for record in store.records(url, name)]
+    messages = [message for name in groups for message in progress.messages(url, name, whole[name])]
+    counted, model = progress.counts(url), str(held["model"])
+    return {
+        "url": url,
+        "title": str(held["title"]),
+        "model": model,
+        "summary": _summary(model),
+        "at_work": ", ".join(store.active_runs(url)),
+        "facts": _facts(held, counted, records),
+        "counts": _counts(counted),
+        "groups": progress.grouped(messages, groups),
+        "notes": dict.fromkeys(note for data in groups.values() for note in data.attrs.get("notes", [])),
+        **_figures(url, model, groups, left_out),
+        **_laws(url, model, groups, bool(left_out)),
+        "outputs": [_outputs(name, data) for name, data in groups.items()],
+        "source": SOURCES.get(model),
+        "file": str(held.get("source") or "campaign.yaml"),
+        "campaign": str(held["campaign"]),
+        "parameters": [_parameters(name, data) for name, data in groups.items()],
+        "rerun": _rerun(url, held),
+    }
 
 
 def _thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
@@ -151,8 +150,10 @@ def _figures(url: str, model: str, groups: Mapping[str, xr.Dataset], left_out: l
             try:
                 figure = plot.describe(groups)
                 figure.leave_out(left_out)
-                drawn = render(figure)
-            except (DataError, FitError, ValueError) as error:  # ValueError: matplotlib cannot read a formula
+                with plot.faults_named():
+                    drawn = render(figure)
+                    picture = base64.b64encode(_svg(drawn)).decode()
+            except (DataError, FitError) as error:
                 not_drawn[name] = str(error)
                 continue
             drawn.origin = provenance(name, [url], command)
@@ -162,7 +163,7 @@ def _figures(url: str, model: str, groups: Mapping[str, xr.Dataset], left_out: l
                 {
                     "name": name.replace("_", " "),
                     "summary": plot.summary,
-                    "source": f"data:image/svg+xml;base64,{base64.b64encode(_svg(drawn)).decode()}",
+                    "source": f"data:image/svg+xml;base64,{picture}",
                     "caption": [plain(line) for line in (heading, *figure.remarks()) if line],
                 }
             )
@@ -187,11 +188,6 @@ def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset], is_large: bool
             results = law.results(groups)
         except (FitError, DataError) as error:
             missing[name] = str(error)
-            continue
-        except Exception as error:
-            if store.is_damage(error):
-                raise
-            missing[name] = f"internal error in this law; please report it with the campaign: {error}"
             continue
         command = f"mdr-dask fit {shlex.quote(url)} {name}"
         tables = [

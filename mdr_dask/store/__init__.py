@@ -13,7 +13,7 @@ from mdr_dask.store.layout import Finding, is_laid_out, lay_out
 from mdr_dask.store.ledgers import ledger, require_undamaged
 from mdr_dask.store.locks import Lock, Part, active_runs, at_work, exclusive, gate, shared, while_locked
 from mdr_dask.store.packing import contents, verify_packed
-from mdr_dask.store.reading import datasets, is_damage, readable, save, with_plain_attributes
+from mdr_dask.store.reading import datasets, save, with_plain_attributes
 from mdr_dask.store.records import attempts, merge_records, records
 from mdr_dask.store.study import attributes, exists, is_study, series_names
 from mdr_dask.store.verification import CHECKSUMS, PUBLISHED, Inspection, repair, verify

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 import zarr
 from numpy.typing import NDArray
-from zarr.abc.store import Store
 from zarr.core.buffer import Buffer
 from zarr.core.sync import sync
 
 from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import (
-    bytes_of,
     chunk_name,
     digest,
     group_name,
@@ -29,9 +27,10 @@ from mdr_dask.store.files import (
     with_digest,
     write_stages,
 )
+from mdr_dask.store.identity import block_digests
 from mdr_dask.store.locks import Lock, while_locked
 from mdr_dask.store.records import name_of
-from mdr_dask.store.study import array_of, document
+from mdr_dask.store.study import array_of, chunks_of, document
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,10 @@ def write_block(
     further = {name: arrays[name].ndim - len(place.index) for name in given}
     keys = {name: chunk_name(place.series, name, place.index, dims) for name, dims in further.items()}
     chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
-    line = with_digest({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
+    region = [[part.start, part.stop] for part in place.region]
+    of_block = {"region": region, "campaign": _digests(place.url, place.series, place.layout)(region)}
+    digests = {name: digest(content) for name, (_, content) in chunks.items()}
+    line = with_digest({**record, **of_block, "chunks": digests})
     ledger = dict([chunks.pop("status")])
     with while_locked(place.url, place.lock):
         write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])
@@ -91,19 +93,20 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return the current values of one output of a group. The order along each axis is the stored order."""
-    (held,) = _opened(url, series, bytes_of(url), [output]).values()
+    (held,) = _opened(url, series, [output]).values()
     with guarded(url, f"reading {output}"):
         return np.asarray(held[...])
 
 
-def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
+def _opened(url: str, series: str, names: Iterable[str] = ()) -> dict[str, Any]:
     """Return the named arrays of a group, or the ledger and all outputs if no name is given."""
     held = document(url, series)
     if held is None:
         raise StoreError(f"{url}: this store, or one of its groups, has been removed")
     shown = held["consolidated_metadata"]["metadata"]
     wanted = names or ("status", *held["attributes"]["outputs"])
-    return {name: array_of(shown[name], store, group_name(series, name)) for name in wanted}
+    chunks = chunks_of(url)
+    return {name: array_of(shown[name], chunks, group_name(series, name)) for name in wanted}
 
 
 @lru_cache(maxsize=64)
@@ -113,7 +116,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     if found != layout:
         what = f"{here} finds another store or another layout" if found else f"not seen from {here}"
         raise StoreError(f"{url}: {what}; the workers need a shared file system or a URL")
-    return _opened(url, series, bytes_of(url))
+    return _opened(url, series)
 
 
 @lru_cache(maxsize=64)
@@ -127,6 +130,11 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
         larger = array_of({**array.metadata.to_dict(), "shape": shape}, memory, array.path)
         empty[name] = larger.with_config({"write_empty_chunks": True})
     return empty, encoded
+
+
+@lru_cache(maxsize=64)
+def _digests(url: str, series: str, layout: str) -> Callable[[Sequence[Sequence[int]]], str]:
+    return block_digests((document(url, series) or {})["attributes"])
 
 
 def layout_mark(url: str) -> str | None:

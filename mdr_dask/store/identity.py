@@ -6,7 +6,7 @@ import itertools
 import json
 import logging
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from typing import Annotated, Any
@@ -19,8 +19,8 @@ from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.campaign.definition import SAME_DIGITS
 from mdr_dask.errors import StoreError
-from mdr_dask.store.files import absolute
-from mdr_dask.store.layout import by_digest, plain_values
+from mdr_dask.store.files import absolute, digest
+from mdr_dask.store.layout import is_file, of_files, plain_values
 from mdr_dask.store.study import attributes, document, series_names
 
 log = logging.getLogger("mdr_dask.store")
@@ -133,20 +133,57 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
     lacking = [name for name in outputs if name not in held["outputs"]]
     if lacking:
         found.append(f"outputs: the store lacks {', '.join(lacking)}; every case would have to be computed again")
-    before = _leaves(by_digest(json.loads(held["parameters"])), "")
-    now = _leaves(by_digest(series.parameters.model_dump(mode="json")), "")
-    varied = tuple(f"{axis}." for axis in axes.keys() | held_axes.keys())
-    fixed = [path for path in sorted(before.keys() | now.keys()) if not f"{path}.".startswith(varied)]
-    return found + [
-        _difference(path, before.get(path), now.get(path)) for path in fixed if before.get(path) != now.get(path)
-    ]
+    varied = axes.keys() | held_axes.keys()
+    before = _fixed(json.loads(held["parameters"]), varied)
+    now = _fixed(series.parameters.model_dump(mode="json"), varied)
+    for path in sorted(before.keys() | now.keys()):
+        if of_files(before.get(path), "sha256") != of_files(now.get(path), "sha256"):
+            stored, wanted = (of_files(each.get(path), "name") for each in (before, now))
+            # a file of the same name has other contents
+            found.append(f"{path}: {wanted} has changed" if stored == wanted else _difference(path, stored, wanted))
+    return found
+
+
+def block_digests(attributes: Mapping[str, Any]) -> Callable[[Sequence[Sequence[int]]], str]:
+    """Return a function that gives the digest of the campaign for each block of a group with these attributes.
+
+    The argument of the function is the region of the block: start and stop along each dimension. The digest contains
+    everything on which the results of the block depend. It does not change if the store is extended.
+    """
+    axes = attributes["axes"]
+    dims = list(dict.fromkeys(axis["dim"] for axis in axes))
+    fixed = _fixed(json.loads(attributes["parameters"]), [axis["path"] for axis in axes])
+    # a parameter that is None may have been unknown to the version that made the store
+    given = {path: value for path, value in fixed.items() if value is not None}
+    study = [attributes[key] for key in ("model", "model_version", "seed", "accuracy", "blocks")]
+    common = _text(of_files([study, given, [axis["path"] for axis in axes]], "sha256"))
+
+    def of_block(region: Sequence[Sequence[int]]) -> str:
+        columns = [axis["values"][slice(*region[dims.index(axis["dim"])])] for axis in axes]
+        return digest("".join([common, *(_text(of_files(column, "sha256")) for column in columns)]).encode())
+
+    return of_block
+
+
+def of_other_campaign(record: Mapping[str, Any], digests: Callable[[Sequence[Sequence[int]]], str]) -> bool:
+    """Return whether the record of a block belongs to another campaign. Older records do not name their campaign."""
+    return "campaign" in record and record["campaign"] != digests(record["region"])
+
+
+def _fixed(parameters: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
+    """Flatten nested parameters to dotted paths, without the paths that vary."""
+    inside = tuple(f"{axis}." for axis in varied)
+    return {path: value for path, value in _leaves(parameters, "").items() if not f"{path}.".startswith(inside)}
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     """Flatten nested parameters to dotted paths."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
-        found |= _leaves(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
+        if isinstance(value, Mapping) and not is_file(value):
+            found |= _leaves(value, f"{prefix}{name}.")
+        else:
+            found[prefix + name] = value
     return found
 
 
@@ -175,11 +212,15 @@ def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
     for position, entry in enumerate(zip(*columns, strict=True)):
-        plain = [float(f"{x:.{SAME_DIGITS}g}") if isinstance(x, float) else by_digest(x) for x in entry]
-        text = json.dumps(plain, sort_keys=True)
+        text = _text(of_files(list(entry), "sha256"))
         found[text, seen[text]] = position
         seen[text] += 1
     return found
+
+
+def _text(values: Iterable[Any]) -> str:
+    """Return values of axes as text. Numbers that differ only by rounding have the same text."""
+    return json.dumps([float(f"{x:.{SAME_DIGITS}g}") if isinstance(x, float) else x for x in values], sort_keys=True)
 
 
 def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], places: IntArray) -> Axis:

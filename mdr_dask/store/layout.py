@@ -118,21 +118,27 @@ def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
 
 def _by_content(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Return the attributes of a series in which digests replace the names of files."""
-    return {name: by_digest(json.loads(each) if name == "parameters" else each) for name, each in attributes.items()}
+    return {
+        name: of_files(json.loads(each) if name == "parameters" else each, "sha256")
+        for name, each in attributes.items()
+    }
 
 
-def by_digest(value: Any) -> Any:
-    """Return a value in which the digest of each file replaces its name and path, also inside lists and mappings.
+def is_file(value: Any) -> bool:
+    """Return whether a stored value is a data file."""
+    return isinstance(value, Mapping) and value.keys() == DataFile.model_fields.keys()
 
-    A study whose files were moved is still the same study.
+
+def of_files(value: Any, key: str) -> Any:
+    """Return a value in which each file is replaced by its digest (`key` is ``sha256``) or by its name.
+
+    Studies are compared by digests, because a study whose files were moved is still the same study.
     """
     if isinstance(value, list):
-        return [by_digest(each) for each in value]
-    if not isinstance(value, Mapping):
-        return value
-    if value.keys() == DataFile.model_fields.keys():
-        return value["sha256"]
-    return {name: by_digest(each) for name, each in value.items()}
+        return [of_files(each, key) for each in value]
+    if isinstance(value, Mapping):
+        return value[key] if is_file(value) else {name: of_files(each, key) for name, each in value.items()}
+    return value
 
 
 def group_names(members: Mapping[str, Any]) -> list[str]:

@@ -17,8 +17,10 @@ from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_many
+from mdr_dask.store.identity import block_digests, of_other_campaign
 from mdr_dask.store.integrity import RECORD
 from mdr_dask.store.layout import layout_faults
+from mdr_dask.store.records import records
 from mdr_dask.store.study import array_of, document
 
 
@@ -102,7 +104,7 @@ def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> 
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
     The values are not read. If `to_run` is true, missing files of the layout are no fault, because the run writes
-    missing files again.
+    missing files again, but results of another campaign are a fault.
     """
     if any(_faults(url, series, to_run)):  # check again: a run may have changed a file meanwhile
         first = next(_faults(url, series, to_run), None)
@@ -121,6 +123,10 @@ def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
     for name in series:
         metadata = document(url, name) or {}
         blocks = Blocks.of(name, metadata)
+        if to_run:
+            digests = block_digests(metadata["attributes"])
+            others = (record["block"] for record in records(url, name) if of_other_campaign(record, digests))
+            yield from (f"block {block} has results of another campaign" for block in others)
         if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunk if all its values were NaN
             continue
         done = _has_done(ledger(url, name), blocks.lengths)

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import traceback
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
 from mdr_dask.models.numbers import entries_of
-from mdr_dask.store.files import bytes_of, group_name, read_json
+from mdr_dask.store.files import group_name, read_json
 from mdr_dask.store.integrity import is_safe
 from mdr_dask.store.ledgers import require_undamaged
-from mdr_dask.store.study import series_names
+from mdr_dask.store.study import chunks_of, series_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,34 +24,15 @@ if TYPE_CHECKING:
 LAZY_BYTES = 2**30
 
 
-@contextmanager
-def readable(url: str) -> Iterator[None]:
-    """Turn the errors that Zarr raises for unreadable chunks into a StoreError with a message of one sentence."""
-    try:
-        yield
-    except Exception as error:
-        if not is_damage(error):
-            raise
-        raise StoreError(f"{url}: damaged, a chunk cannot be read: {error}") from None
-
-
-def is_damage(error: Exception) -> bool:
-    """Return whether an error comes from Zarr or a codec, and so means that a chunk cannot be read."""
-    *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
-    package = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
-    return not isinstance(error, OSError) and package in ("zarr", "numcodecs")
-
-
 def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
     The values of numeric axes are in ascending order. The group of a study without series has the name ``""``, or
     ``"-"`` if an earlier mdr_dask has added series to the study. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
-    with readable(url):
-        names = series_names(url)
-        require_undamaged(url, names)
-        return {name: _open_sorted(url, name) for name in names}
+    names = series_names(url)
+    require_undamaged(url, names)
+    return {name: _open_sorted(url, name) for name in names}
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
@@ -62,7 +40,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
     if not is_safe(read_json(url, group_name(series, "zarr.json")) or {}):
         raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is missing or damaged")
-    opened = partial(xr.open_zarr, bytes_of(url), group=group_name(series) or None, consolidated=True, zarr_format=3)
+    opened = partial(xr.open_zarr, chunks_of(url), group=group_name(series) or None, consolidated=True, zarr_format=3)
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Set
 from functools import lru_cache
 from typing import Any
 
+import google_crc32c
 import zarr
 from zarr.abc.store import Store
 from zarr.storage import StorePath
@@ -15,9 +17,9 @@ from mdr_dask.store.files import (
     KEPT,
     LAYOUT,
     ROOT,
+    bytes_of,
     digest,
     group_name,
-    guarded,
     local,
     parsed,
     read_bytes,
@@ -37,8 +39,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     content = read_bytes(url, "zarr.json")
     if content is None:
         return None
-    with guarded(url, "reading zarr.json"):
-        root = _checked(url, content)
+    root = _checked(url, content)
     if root is None:
         raise StoreError(f"{url}: zarr.json is damaged; 'mdr-dask verify {url}' names all faults")
     return group_of(root, group_name(series))
@@ -47,7 +48,10 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
     """Return the metadata of a study, or None if the metadata are unsafe or not in the record of the layout."""
-    root = parsed(content)
+    try:
+        root = parsed(content)
+    except ValueError:
+        return None
     if not isinstance(root, dict) or not isinstance(attributes := root.get("attributes", {}), dict):
         return None
     layout = attributes.get("mdr_dask_layout", LAYOUT + 1)
@@ -77,6 +81,37 @@ def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
     """Return the Zarr array with the given metadata, without reading the metadata again."""
     return zarr.Array(zarr.AsyncArray(dict[str, Any](metadata), StorePath(store, path)))  # type: ignore[call-overload]
+
+
+class _Chunks(zarr.storage.WrapperStore[Store]):
+    """A Zarr store for reading arrays. Reading a damaged chunk raises StoreError with the name of the chunk."""
+
+    def __init__(self, store: Store, url: str, checked: Set[str]) -> None:
+        super().__init__(store)
+        # names of the arrays whose chunks end with a checksum
+        self._url, self._checked = url, checked
+
+    def _with_store(self, store: Store) -> _Chunks:
+        return _Chunks(store, self._url, self._checked)
+
+    async def get(self, key: str, *arguments: Any, **options: Any) -> Any:
+        found = await super().get(key, *arguments, **options)
+        if found is not None and _CHUNK.sub("", key) in self._checked:
+            content = found.to_bytes()
+            # as the codec `crc32c` writes it
+            if google_crc32c.value(content[:-4]).to_bytes(4, "little") != content[-4:]:
+                raise StoreError(f"{self._url}: {key} is damaged; 'mdr-dask verify {self._url}' names all faults")
+        return found
+
+
+_CHUNK = re.compile(r"/c(/\d+)*$")
+
+
+def chunks_of(url: str) -> Store:
+    """Return the Zarr store at a path or URL, for reading arrays."""
+    members = (document(url) or {})["consolidated_metadata"]["metadata"]
+    codecs = {name: [codec["name"] for codec in member.get("codecs", ())] for name, member in members.items()}
+    return _Chunks(bytes_of(url), url, {name for name in codecs if "crc32c" in codecs[name]})
 
 
 def refuse_file(url: str, expected: str = "the folder of a store") -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from mdr_dask.errors import StoreBusyError
@@ -21,6 +21,7 @@ from mdr_dask.store.files import (
     write_bytes,
     write_stages,
 )
+from mdr_dask.store.identity import block_digests, of_other_campaign
 from mdr_dask.store.integrity import RECORD, read_record
 from mdr_dask.store.layout import Finding, coordinate_files, group_names, layout_faults, metadata_files
 from mdr_dask.store.ledgers import Blocks
@@ -40,6 +41,8 @@ class Group:
     """A group of a store during verification: the blocks of the group, and the faults that `repair` removes."""
 
     blocks: Blocks
+    # The digest of the campaign for each block (`mdr_dask.store.identity.block_digests`).
+    digests: Callable[[Sequence[Sequence[int]]], str]
     # Digests of the written chunks. The keys are the block, the number of the attempt, and the name of the array.
     attempts: dict[BlockIndex, dict[int, Mapping[str, str]]] = field(default_factory=dict)
     # Blocks with merged records. The ledger must contain these blocks.
@@ -140,7 +143,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
     for name in ["", *group_names(members)]:
         group = group_of(root, name)
         if group is not None and "status" in group["consolidated_metadata"]["metadata"]:
-            found.groups.append(Group(Blocks.of(name, group)))
+            found.groups.append(Group(Blocks.of(name, group), block_digests(group["attributes"])))
     if record is None:
         if root["attributes"]["mdr_dask_layout"] < LAYOUT:
             found.notes.append("made by version 0.1, without digests: its files cannot be checked")
@@ -165,6 +168,13 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
         else:
             block = tuple(record["block"])
             group.attempts.setdefault(block, {})[record["attempt"]] = record.get("chunks", {})
+            if of_other_campaign(record, group.digests):
+                finding = Finding(
+                    "foreign", name, f"contains the record of block {record['block']} of another campaign"
+                )
+                found.findings.append(finding)
+                group.bad_records.add(name)
+                group.bad_blocks.add(block)
             if is_merged:  # records are merged only for blocks in the ledger
                 group.finished.add(block)
             continue

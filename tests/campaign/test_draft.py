@@ -83,6 +83,7 @@ def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
     (tmp_path / "drafted.py").write_text(MODULE.replace(hardness, hardness + bounds))
     assert main(["init", "drafted:MODEL", "-o", "pin.yaml"]) == 0
     assert main(["check", "pin.yaml"]) == 0
+    assert "\nname: wear_rate\n" in (tmp_path / "pin.yaml").read_text()
     assert "hardness: 1 Pa" in (tmp_path / "pin.yaml").read_text()
     assert "passes: 3 " in (tmp_path / "pin.yaml").read_text()  # above a bound without an upper one
     assert "angle: 15 rad " in (tmp_path / "pin.yaml").read_text()  # between two bounds

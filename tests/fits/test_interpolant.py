@@ -65,7 +65,11 @@ def test_the_study_itself_is_in_the_table():
 @pytest.mark.parametrize(
     ("change", "what"),
     [
-        (lambda d: d.isel(force=0, velocity=slice(3)), "at least 4 numbers"),
+        (lambda d: d.isel(force=0, velocity=0), "at least 4 numbers"),
+        (
+            lambda d: d.isel(force=slice(3)),
+            "force: expected at least 4 values, got 3; keep one by --select force=VALUE",
+        ),
         (lambda d: d.stack(case=["force", "velocity"]), "sampled study"),
         (lambda d: d.where(d.velocity < 10), "cases have no value"),
     ],

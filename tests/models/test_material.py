@@ -230,7 +230,7 @@ def test_a_gap_of_one_modulus_is_closed_by_the_other(tmp_path):
     ("text", "message"),
     [
         ("300,1\n310,2\n", "values of a_T that decrease with the temperature"),
-        ("300,1\n", "expected two or more temperatures"),
+        ("300,1\n", "expected two or more different temperatures"),
         ("300,1\n310,0.1\n", r"expected a temperature in the range of the table, 26.85 degC to 36.85 degC, got 46.85"),
     ],
 )
