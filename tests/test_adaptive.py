@@ -212,7 +212,7 @@ def test_invalid_adaptive_axes_are_refused(study, case):
 
 
 def test_laws_and_tables_omit_values_that_were_not_needed(study, url):
-    shifts = [-1.2, 0.4]
+    shifts = [-1.2, -0.4, 0.4, 1.2]
     run(study(f"shift: {shifts}"), url)
     data = store.datasets(url)[""]
     needed = int((data.status == Status.DONE).sum())

@@ -238,7 +238,7 @@ def test_check_and_fit_state_the_error_of_the_fast_rule(write, capsys):
     body = PowerProfile(2.0)
     for percent, stick_radius in re.findall(r"(\d+) % (?:too small )?at (?:the stick radius )?([\d.]+) a0", note):
         amounts = [0.25, 1.0, 2.0, 4.0]
-        worn = exact(body, float(stick_radius), amounts, errors=False)
+        worn = exact(body, float(stick_radius), amounts)
         fast = [rules.fast(body, float(stick_radius), amount) for amount in amounts]
         ratios = [one.wear_volume / other.wear_volume for one, other in zip(fast, worn, strict=True)]
         assert 100 * (1 - min(ratios)) == pytest.approx(float(percent), abs=1)

@@ -141,7 +141,7 @@ def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
     """Return the contact after each wanted number of cycles. All contacts are taken from the same solution."""
-    c = max(_moved(profile, stick_radius, resolution.flat), stick_radius) if constant_force else stick_radius
+    c = _moved(profile, stick_radius, resolution.flat) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
         reach = farthest_contact(profile, c) if constant_force else 1.05 * limit_radius(profile, c)
@@ -172,7 +172,7 @@ def _fretted(
         contact = _contact(*next(leg for leg in legs if time <= leg[1][-1].time), time)
         rise = (contact.depth - 1.0) / problem.eta
         if constant_force and rise < resolution.flat:
-            contact = replace(contact, stick_border=max(_moved(profile, stick_radius, rise), stick_radius))
+            contact = replace(contact, stick_border=_moved(profile, stick_radius, rise))
         contacts[time] = contact
     if late:
         contacts |= dict.fromkeys(late, _end(problem, start) if start else limit(profile, c))
@@ -180,9 +180,12 @@ def _fretted(
 
 
 def _moved(profile: Profile, c: float, rise: float) -> float:
-    """Return the stick border b of the virgin body pressed deeper by rise * eta, from g0(b) = g0(c) + rise * eta."""
+    """Return the stick border b of the virgin body pressed deeper by rise * eta, from g0(b) = g0(c) + rise * eta.
+
+    By rounding errors, the rise can be negative or b slightly smaller than c. The result is never smaller than c.
+    """
     level = float(profile.image(np.array(c)))
-    return profile.inside(level + rise * (1.0 - level))
+    return max(profile.inside(level + max(rise, 0.0) * (1.0 - level)), c)
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:

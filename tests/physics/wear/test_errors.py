@@ -41,7 +41,7 @@ def test_stated_errors_hold(slips, constant_force, accuracy):
     assert np.all(shares >= 0.94)  # 36 contacts: two of them may miss
 
 
-@pytest.mark.parametrize("accuracy", [1e-1, 1e-2, 1e-3])
+@pytest.mark.parametrize("accuracy", [4e-3, 1e-3])
 @pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.222), (1.37, 0.8), (4.608, 0.1109), (1.0, 0.5), (2.0, 0.999)])
 def test_little_wear_is_of_the_first_order(exponent, c, accuracy):
     """To first order f - f0 = N p0 s0 of the virgin contact; it was up to 45 % off below N = 1e-4."""
