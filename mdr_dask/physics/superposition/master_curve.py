@@ -157,7 +157,8 @@ def superpose(
     [0. 1. 2.]
     """
     values, arrays = _sorted(groups, curves)
-    rise = known_rise(values if kelvin is None else np.sort(np.asarray(kelvin, dtype=np.float64)), vertical)
+    absolute = values if kelvin is None else np.asarray(kelvin, dtype=np.float64)[np.argsort(np.ravel(groups))]
+    rise = known_rise(absolute, vertical)
     width = float(np.median([np.ptp(x) for x, _ in arrays]))
     problem = Curves(
         x=np.concatenate([x for x, _ in arrays]) / width,
