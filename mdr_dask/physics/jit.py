@@ -1,7 +1,7 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
-Numba compiles a kernel again only if the file that contains the kernel has changed. If you change a function that is
-called by kernels in other files, empty numba's cache or set NUMBA_CACHE_DIR to a new folder.
+To decide whether a stored kernel is out of date, numba checks only the file that contains the kernel. If you change a
+function that is called by kernels in other files, empty numba's cache or set NUMBA_CACHE_DIR to a new folder.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def jit(function: Kernel) -> Kernel:
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that must not create arrays. It reads arrays in named tuples several times faster."""
+    """Compile a function that must not create arrays. Arrays in named tuples are then read several times faster."""
     return _cached(function, UNCOUNTED)
 
 
@@ -35,7 +35,7 @@ def jit_inline(function: Kernel) -> Kernel:
 
 
 def jit_inline_fused(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls the function, and round ``a * b + c`` only once."""
+    """Compile a function into each kernel that calls the function, and let ``a * b + c`` be rounded only once."""
     return cast(Kernel, numba.njit(forceinline=True, fastmath={"contract"}, **OPTIONS)(function))
 
 

@@ -1,16 +1,17 @@
 """Grid refinement, in which the difference between the results on two grids gives an estimate of the error.
 
-The number of cells doubles from one level to the next. If a solver has the order of convergence p, the error is divided
-by r = 2^p at each level. Take three successive levels. Let b be the relative change of a result from the first level to
-the second, and c the relative change from the second level to the third. The relative error on the third level is
-estimated as
+Usually, the number of cells doubles from one level to the next. If a solver has the order of convergence p, the error
+is divided by r = 2^p at each level. Take three successive levels. Let b be the relative change of a result from the
+first level to the second, and c the relative change from the second level to the third. The relative error on the third
+level is estimated as
 
     error = safety * max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first expression, c / (r - 1), is Richardson's estimate. The second expression is needed because the results on the
-last two levels may agree by chance. After the change b, the next change should be b / r. The safety factor is taken
-from the grid convergence index (Roache, J. Fluids Eng. 116, 405, 1994). The last term, e (`Solution.unseen`), stands
-for errors that may be equal on two grids. Equal errors do not appear in the difference between the results.
+last two levels may agree by chance. After the change b, the next change should be b / r. After only two levels, b is
+unknown, and Richardson's estimate is used alone. The safety factor is taken from the grid convergence index (Roache, J.
+Fluids Eng. 116, 405, 1994). The last term, e (`Solution.unseen`), stands for errors that may be equal on two grids.
+Equal errors do not appear in the difference between the results.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ SAFETY = 3.0
 """Roache's safety factor for an estimate from two grids."""
 
 MOST_ITERATIONS = 100
-"""Largest number of steps in a search for a root. As many bisections give more than floating-point accuracy."""
+"""Largest number of steps of an iteration. As bisections, 100 steps divide an interval by 2^100."""
 
 EPS = float(np.finfo(np.float64).eps)
 """Relative rounding error of floating-point numbers."""
@@ -65,10 +66,10 @@ class Solution(NamedTuple):
 class Refined(NamedTuple):
     """Results of `refine` for all cases.
 
-    `values` is NaN for cases without a solution. `errors`, shape (outputs, cases), contains absolute errors, or
-    infinity if no estimate is possible. The error of a profile is the largest error along the profile. `met` is True
-    for a case if every requested output meets the accuracy. `level` is the level of the grid on which the case was
-    solved.
+    `values` contains one array per output, with NaN for cases without a solution. `errors`, shape (outputs, cases),
+    contains absolute errors, or infinity if no estimate is possible. The error of a profile is the largest error along
+    the profile. `met` is True for a case if every requested output meets the accuracy. `level` is the level of the grid
+    on which the case was solved, or the last level that was tried if the case has no solution.
     """
 
     values: list[FloatArray]
@@ -92,15 +93,17 @@ def refine(
 ) -> Refined:
     """Solve every case on the coarsest grid on which all requested outputs meet `accuracy`.
 
-    The function `solve(level, cases)` solves the cases with the given indices on the grid of a level, and must not
-    raise an exception for a case that fails. Every case is solved on at least two levels, unless the parameters of the
-    case are the cause of a failure. If a case fails on fine grids only, the solution on the finest grid without a
-    failure is returned.
+    If a case does not meet the accuracy on any grid, the solution on the finest grid is returned.
 
-    The accuracy of an output is relative to the largest absolute value of the output, or to the entry of the output in
-    `floors` if this entry is larger. If `accuracy` is infinite, the result on the second level is accepted. `order` is
-    the order of convergence of the dominant part of the error, one number or one for each output. Only the first
-    `requested` outputs must meet the accuracy, or all outputs if `requested` is None.
+    The function `solve(level, cases)` solves the cases with the given indices on the grid of a level, and must not
+    raise an exception for a case that fails. If `levels` has more than one entry, every case is solved on at least two
+    levels, unless the parameters of the case are the cause of a failure. If a case fails on fine grids only, the
+    solution on the finest grid without a failure is returned instead.
+
+    The accuracy of an output is relative to the largest absolute value of the output in the case, or to the entry of
+    the output in `floors` if this entry is larger. If `accuracy` is infinite, the result on the second level is
+    accepted. `order` is the order of convergence of the dominant part of the error, one number or one for each output.
+    Only the first `requested` outputs must meet the accuracy, or all outputs if `requested` is None.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all requested
     outputs of this case, because a single output may have the same value on two grids by chance. Outputs that are not
@@ -148,7 +151,7 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
     The largest change along a profile is divided by the largest absolute value of the profile, or by the floor of the
     output if the floor is larger. Positions at which one of the two profiles does not exist are ignored. The change is
-    infinite unless the case has a solution on both grids.
+    infinite if the case has no solution on one of the grids, or if a number is NaN on only one of the grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))

@@ -165,7 +165,7 @@ def fit_series(
     Parameters
     ----------
     angular_frequency : array_like, shape (points,)
-        Angular frequencies omega in rad/s, over at least one decade, in any order.
+        Angular frequencies omega in rad/s, in any order. They should cover at least one decade.
     storage, loss : array_like, shape (points,)
         G' and G'' in Pa, all positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
     terms_per_decade : float

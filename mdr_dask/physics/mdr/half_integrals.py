@@ -20,11 +20,13 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels between `edges`. In each panel, a function is represented by the polynomial through the values at `nodes`.
+    """Panels between `edges`, and the `nodes` at which the values of a function are given.
 
     Each panel has `order` nodes: the interior Lobatto points and the right end of the panel. There is no node at the
-    first edge, 0, because functions may jump at 0. `barycentric`, shape (panels, order + 1), contains the weights of
-    barycentric interpolation. In the row of the first panel, only the last `order` weights are used.
+    first edge, 0, because functions may jump at 0. In a panel, a function is represented by the polynomial through the
+    values at the nodes of this panel and, except in the first panel, at the last node of the previous panel.
+    `barycentric`, shape (panels, order + 1), contains the weights of barycentric interpolation. In the row of the first
+    panel, only the last `order` weights are used.
     """
 
     edges: FloatArray
@@ -128,7 +130,7 @@ def _add_panel(
 
 @jit
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values` at the positions `places`, or 0 at positions beyond the mesh."""
+    """Return the piecewise polynomial through `values` at the positions `places`, or 0 from the end of the mesh on."""
     result = np.empty_like(places)
     for number in range(places.size):
         result[number] = value_at(mesh, values, places[number])
@@ -137,7 +139,7 @@ def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArra
 
 @jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
-    """Return the piecewise polynomial through `values` at the position `place`, or 0 at a position beyond the mesh."""
+    """Return the piecewise polynomial through `values` at the position `place`, or 0 from the end of the mesh on."""
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order

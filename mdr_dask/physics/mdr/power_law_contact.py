@@ -1,6 +1,7 @@
-"""Closed forms for normal contacts of bodies with the profile f = A r^n and the effective modulus E_star.
+"""Closed forms for normal contacts of bodies with the profile f = A r^n and the contact modulus `E_star`.
 
-The factor kappa_n is `power_factor(n)`. Tangential forces have no effect, as the bodies are elastically similar.
+The factor kappa_n is `power_factor(n)`. The two bodies are assumed to be elastically similar, so that tangential forces
+have no effect on the normal contact.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A body with piecewise cubic f0(r) and g0(x) in units of d0. `length` is a0 in the unit of length of the body."""
+    """A body with piecewise cubic f0(r) and g0(x). `length` is a0 in the unit of length of the original table."""
 
     curve: PPoly
     image_curve: PPoly
@@ -80,7 +80,7 @@ class TableProfile:
         return np.where(position <= self.largest_radius * (1 + CLOSE), self.image_curve(np.asarray(position)), np.nan)
 
     def image_slope(self, position: FloatArray) -> FloatArray:
-        """Return g0'(x)."""
+        """Return g0'(x). Beyond the largest radius, the last cubic is continued."""
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
@@ -91,7 +91,7 @@ class TableProfile:
         return np.where(np.abs(gap) < 0.02, short, self.image(start + gap) - self.image(np.asarray(start)))
 
     def inside(self, level: float) -> float:
-        """Return the position where g0 reaches `level`, by bisection."""
+        """Return the position between 0 and 1 where g0 reaches `level`, by bisection."""
         return bisect(lambda x: float(self.image_curve(np.asarray(x))) - level, 0.0, 1.0)
 
 
@@ -101,7 +101,8 @@ Profile = PowerProfile | TableProfile
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
     """Return the profile of a body that is given by a table of radii and heights and pressed to a depth.
 
-    All lengths have the same unit. The radii begin at 0, and heights are measured from the first height.
+    All lengths have the same unit. The radii must begin at 0. The first height is subtracted from all heights. A
+    ValueError is raised if the table is not a rising profile, or if the contact reaches beyond the table.
     """
     r, f = np.asarray(radius, dtype=float), np.asarray(height, dtype=float)
     check_table(r, f)
@@ -121,7 +122,7 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:
-    """Raise ValueError unless all values are finite, the first radius is 0, and both radii and heights increase."""
+    """Raise ValueError unless the table has at least 4 finite rows, starts at radius 0, and both columns increase."""
     if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
         raise ValueError(
             f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
@@ -163,7 +164,7 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 
 
 def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
-    """Return the cubic spline through the points, or the monotone cubic interpolant if this spline decreases."""
+    """Return the cubic spline through the points, or the monotone cubic interpolant if the spline falls somewhere."""
     spline = CubicSpline(x, y)
     fine = (x[:-1, None] + np.diff(x)[:, None] * np.linspace(0.0, 1.0, 9)).ravel()
     falls = np.any(spline(fine, 1) < -CLOSE * np.max(np.abs(spline(fine, 1))))

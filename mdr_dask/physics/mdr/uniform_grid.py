@@ -1,8 +1,9 @@
 """The transforms of piecewise linear functions on a uniform grid, with exact integrals over each cell.
 
-With the cell width h, the error of the inverse transform is proportional to h^2, and the error of the forward transform
-is proportional to h^1.5. The error of the pressure is proportional to h, and is largest next to the axis. Unlike the
-panels of `half_integrals`, this grid is suitable for functions with any number of kinks.
+With the cell width h, the error of the inverse transform (image to profile) is proportional to h^2, and the error of
+the forward transform (profile to image) is proportional to h^1.5. The error of the pressure is proportional to h, and
+is largest next to the axis. Unlike the panels of `half_integrals`, this grid is suitable for functions with any number
+of kinks.
 """
 
 from __future__ import annotations
@@ -35,7 +36,10 @@ class UniformGrid:
         return float(self.nodes[1])
 
     def edge(self, image: FloatArray, depth: float) -> float:
-        """Return the smallest radius at which the image reaches the depth, by linear interpolation between nodes."""
+        """Return the smallest radius at which the image reaches the depth, by linear interpolation between nodes.
+
+        If the image is below the depth at all nodes, return the last radius of the grid.
+        """
         beyond = np.flatnonzero(image >= depth)
         if beyond.size == 0:
             return float(self.nodes[-1])
@@ -45,7 +49,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p / E* at the nodes. In the cell of the contact edge, the line load falls linearly to zero."""
+        """Return p / E* at the nodes. In the last cell of the contact, the line load falls linearly to the edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load

@@ -1,10 +1,10 @@
 """Velocity jumps solved to a requested accuracy, with estimated errors.
 
 The steady states before and after a jump, and the drag just after the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The march is computed on one grid only. From drag and depth in the march, the steady
-values on the same grid are subtracted, and the accurate steady values are added. A transient is therefore accurate even
-if it is much smaller than the friction. The error of the transient is estimated by a second march with half as many
-nodes and half as many time steps.
+(:mod:`mdr_dask.physics.refine`). The transient is computed by a march on one grid. From drag and depth in the march,
+the steady values on the same grid are subtracted, and the accurate steady values are added. A transient is therefore
+accurate even if it is much smaller than the friction. The error of the transient is estimated by a second march with
+half as many nodes and half as many time steps.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ class Jumps(NamedTuple):
     """Results of the velocity jumps on a line.
 
     Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height. `trace`
-    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute. `trace_error`
-    and `depth_error` are NaN if these errors were not requested. `contact` is the larger of two fractions of the line:
-    the fraction in contact in steady sliding before the jump, and the fraction after it.
+    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute. `errors` is
+    NaN if no accuracy was requested. `trace`, `depth` and their errors are NaN for cases without a solution. The errors
+    `trace_error` and `depth_error` are also NaN if they were not requested. `contact` is the larger of two fractions of
+    the line: the fraction in contact in steady sliding before the jump, and the fraction after it.
     """
 
     levels: Levels
@@ -125,7 +126,10 @@ def solve_jumps(
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and depth between the two grids at or after each of `times`."""
+    """Return the largest differences of drag and depth between the two grids at or after each of `times`.
+
+    The differences are infinite if there is no march on the coarse grid.
+    """
     if coarse is None:
         return np.full((2, times.size), np.inf)
     everywhere = np.union1d(times, fine.time)

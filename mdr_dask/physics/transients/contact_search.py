@@ -74,7 +74,7 @@ class Reachable(NamedTuple):
     """Runs of cells in which contact is possible at depths between two limits.
 
     Each row of `runs` contains the first and the last node of a run. `second` is the largest height outside the patch
-    that contains the highest point of the line.
+    that contains the highest point of the line, in steady sliding at the lower of the two velocities.
     """
 
     runs: IntArray
@@ -84,8 +84,9 @@ class Reachable(NamedTuple):
 class Workspace(NamedTuple):
     """Work arrays and results of a search: `start` and `end` of every patch, and the `sums` over all patches.
 
-    The barriers of the cells belong to the Deborah number after the jump. `free_until` contains, for each cell, the
-    largest depth at which the cell is certainly out of contact.
+    Only the first entries of `start` and `end` are used: as many as `find_contact` returns. The barriers of the cells
+    belong to the Deborah number after the jump. `free_until` contains, for each cell, the largest depth at which the
+    cell is certainly out of contact.
     """
 
     start: FloatArray
@@ -240,11 +241,11 @@ def _search_period(search: Search, runs: IntArray) -> int:
 
 @jit_inline_uncounted
 def _skip_pressed(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from i to `stop` in which contact may end or elements may have separated.
+    """Return the first cell from i on in which contact may end or elements may have separated, but at most `stop`.
 
-    A cell is skipped if no element has separated in the cell, and if the displacement u of free elements stays below w
-    = depth + h. Along the line u' = (drift - u) / D (see `free_recovery`). Therefore u stays below w wherever w + D h'
-    exceeds the largest drift.
+    A cell is skipped if no element has separated in the cell, if the force on elements in contact is positive in the
+    cell, and if the displacement u of free elements stays below w = depth + h. Along the line u' = (drift - u) / D (see
+    `free_recovery`). Therefore u stays below w wherever w + D h' exceeds the largest drift.
     """
     now, recovery, barriers = search.now, search.work.recovery, search.work.barriers
     begin, firm, until = search.work.scan[BEGIN], 0.0, 0.0
@@ -262,7 +263,7 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _skip_free(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from i to `stop` in which contact may begin."""
+    """Return the first cell from i on in which contact may begin, but at most `stop`."""
     now, scan, barriers = search.now, search.work.scan, search.work.barriers
     drift, fade = search.work.recovery.bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
     lowest = scan[LOWEST]

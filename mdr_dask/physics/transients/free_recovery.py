@@ -7,11 +7,11 @@ decays afterwards. The displacement of the element is the largest of the decayed
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
 This formula needs only the history of the depth d(t). A free element separated from the line at the time t' of the
-maximum, and the force on the element was zero then.
+maximum. Unless the element separated at the jump itself, the force on the element was zero then.
 
-The *drift* of free elements is D u' + u, where u' is the derivative along the line. The drift is -d'(t') exp(-(t -
-t')), where t' is the time of separation and d' is the rate of the depth. The extremes of the drift over the recent past
-(`PathBounds`) limit how fast u can change along the line.
+The *drift* of free elements is D u' + u, where u' is the derivative along the line. If an element separated after the
+jump, its drift is -d'(t') exp(-(t - t')), where t' is the time of separation and d' is the rate of the depth. The
+extremes of the drift over the recent past (`PathBounds`) limit how fast u can change along the line.
 """
 
 from __future__ import annotations
@@ -67,8 +67,9 @@ class FreeRecovery(NamedTuple):
 
     An entry with ``earliest == place`` is a place of separation. The force on elements in contact is zero at `place`
     now. At earlier instants since the jump, this force may have been zero anywhere between `place` and `farthest`.
-    Every other entry is a run of cells from `earliest` to `place`. The force is positive there now, but elements may
-    have separated there at times when the lift was below `barrier`.
+    If the search begins out of contact, the highest point of the line is an entry, too, although the force is not zero
+    there. Every other entry is a run of cells from `earliest` to `place`. The force is positive there now, but elements
+    may have separated there at times when the lift was below `barrier`. Only the first `count[0]` entries are used.
     """
 
     earliest: FloatArray
@@ -209,7 +210,10 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return the displacement u, du/dx and du/d(depth) of an element at x that separated at entry k of `recovery`."""
+    """Return the displacement u, du/dx and du/d(depth) of an element at x that separated at entry k of `recovery`.
+
+    If the element did not separate there, the returned displacement is -1.
+    """
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0
@@ -219,7 +223,7 @@ def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> 
 
 @jit_inline_uncounted
 def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
-    """Return the displacement u and du/dx at x of elements that have been free since before the jump.
+    """Return the displacement u and du/dx at x of elements that separated before the jump or at the jump.
 
     If the displacement is at most `least`, the two returned values may be 0.
     """
@@ -296,7 +300,8 @@ def contact_begin(
 def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: float) -> tuple[float, float]:
     """Return the place between `low` and `high` where the line is nearest to free elements, and the gap there.
 
-    The search stops at the first place where the line is above the free elements.
+    The search stops at the first place where the line is above the free elements. If `low` and `high` are closer than
+    `AT_EDGE`, `high` and a gap of -1 are returned without a search.
     """
     x, gap = high, -1.0
     while gap <= 0 and high - low > AT_EDGE:

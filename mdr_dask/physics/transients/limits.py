@@ -64,13 +64,13 @@ class PreparedLine(NamedTuple):
 class SteadyLimits(NamedTuple):
     """Steady states before and after a jump, and the state just after the jump.
 
-    `before` is the drag F_x / (4 G L) in steady sliding at v_1, `at` the drag just after the jump, and `after` the
-    drag in steady sliding at v_2. The unit of the drag is the unit of height squared divided by the unit of length.
-    Just after the jump, `rate` is the derivative of the depth with respect to t / tau, and `tilt` is the derivative
-    of the drag with respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values,
-    before and after the jump. `first` contains the contact patches before the jump, and `slower` the patches in
-    steady sliding at the lower of the two velocities. If one of the two steady states was not found, `first` and
-    `slower` are None. `is_full` states whether the whole line is in contact in both steady states.
+    `before` is the drag F_x / (4 G L) in steady sliding at v_1, `at` the drag just after the jump, and `after` the drag
+    in steady sliding at v_2. The unit of the drag is the unit of height squared divided by the unit of length. Just
+    after the jump, `rate` is the derivative of the depth with respect to t / tau, and `tilt` is the derivative of the
+    drag with respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values, before and
+    after the jump. `first` contains the contact patches before the jump, and `slower` the patches in steady sliding at
+    the lower of the two velocities. If one of the two steady states was not found, `first` and `slower` are None, and
+    all numbers are NaN. `is_full` states whether the whole line is in contact in both steady states.
     """
 
     before: float

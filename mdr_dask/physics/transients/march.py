@@ -145,6 +145,8 @@ def _extrapolated(found: Trajectory, now: int) -> float:
 def march_depth(marching: Marching, found: Trajectory, work: Workspace) -> int:
     """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
+    The first two time steps use formulas of second order.
+
     `found` contains all times. The other quantities in `found` are given at the first instant, and are written for all
     later instants. Return an `Outcome`.
     """

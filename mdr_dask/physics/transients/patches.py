@@ -17,7 +17,8 @@ from mdr_dask.physics.refine import MOST_ITERATIONS
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
-AT_EDGE = 1e-2  # in cells; the search for an edge of contact ends after a shorter step s, with an error of about s^3
+# The search for an edge of contact ends after a step s shorter than AT_EDGE, with an error of about s^3 (in cells).
+AT_EDGE = 1e-2
 # Entries of the sums over the patches; load and drag are divided by 4 G dx
 (
     LOAD,
@@ -25,9 +26,9 @@ AT_EDGE = 1e-2  # in cells; the search for an edge of contact ends after a short
     LENGTH,  # length in contact
     TILT,  # integral of the slope over the length in contact
     STIFFNESS,  # derivative of the load with respect to the depth
-    DRAG_STIFFNESS,
-    GROWTH,  # rate at which the load changes because patches grow
-    DRAG_GROWTH,
+    DRAG_STIFFNESS,  # derivative of the drag with respect to the depth
+    GROWTH,  # rate at which the load changes because patches grow or shrink
+    DRAG_GROWTH,  # rate at which the drag changes because patches grow or shrink
 ) = range(8)
 SUMS = 8
 
@@ -193,7 +194,10 @@ def force_at(line: Cubic, lift: float, deborah: float, y: float) -> float:
 
 @jit_inline_uncounted
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
-    """Return whether the force on elements in contact would be positive everywhere in cell i."""
+    """Return whether the force on elements in contact would be positive everywhere in cell i.
+
+    If the barriers of the block of this cell have not been computed yet, they are written to `barriers`.
+    """
     block = np.uintp(i) // np.uintp(BLOCK)
     if np.isnan(barriers.block[block]):
         write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers)

@@ -40,8 +40,8 @@ class MarchRequest(NamedTuple):
 class Path(NamedTuple):
     """Drag and depth at the instants of a march, and the rates of drag and depth, shape (2, instants) each.
 
-    Times since the jump are divided by the relaxation time. The first rate of the drag is unknown and is NaN. `falls`
-    is True if the velocity falls.
+    Times since the jump are divided by the relaxation time, and rates are derivatives with respect to these times. The
+    first rate of the drag is unknown and is NaN. `falls` is True if the velocity falls.
     """
 
     time: FloatArray
@@ -93,7 +93,8 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
 class Jump(NamedTuple):
     """Drag F_x / (4 G L) and depth at the requested times after a velocity jump.
 
-    `path` is None if there was no march.
+    `path` is None in full contact, where there is no transient, and if the jump was not solved. In the second case,
+    drag and depth are NaN.
     """
 
     trace: FloatArray
@@ -131,11 +132,11 @@ def _failed(times: FloatArray, outcome: Outcome) -> Jump:
 def march(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> tuple[Marching, Trajectory, Workspace, Outcome]:
-    """Return the march from the steady state before the jump to the steady state after it, and the outcome.
+    """March from the steady state before the jump. Return constants, trajectory and workspace, and the outcome.
 
     In the march, lengths are in cells, and the load is F_N / (4 G dx). The depth may leave the interval between the two
-    steady depths by a margin, which is as large as the interval. If this margin is not sufficient, the march is
-    repeated with 4 times and then with 16 times the margin.
+    steady depths by a margin, which is at first as large as the interval. If the march fails, it is repeated with 4
+    times and then with 16 times this margin, because the margin may have been too small.
     """
     cells = line.track.cells
     load, deborah = load * cells, deborah * cells
@@ -161,7 +162,8 @@ def _begun(
 
     `change` is the change of the steady depth due to the jump. The depth may leave the interval between the steady
     depths by `margin`. The times are equidistant in log(1 + t / onset). The onset is the time in which the line travels
-    1 / q_max at the larger of the speeds v_2 and v_1 - v_2, but at most one relaxation time.
+    1 / q_max at the larger of the speeds v_2 and v_1 - v_2, but at most one relaxation time. If the velocity falls, the
+    onset is also so small that the first time step ends no later than the first requested time after the jump.
     """
     assert limits.first is not None
     assert limits.slower is not None

@@ -19,7 +19,8 @@ from mdr_dask.physics.wear.worn import FUNCTIONS, Worn
 # Each level has a quarter of the tolerance of the level before. DEFAULT is the level with the default tolerance of
 # `exact`. Round-off prevents a smaller tolerance than that of the level FINEST.
 DEFAULT, FINEST = 2, 5
-# With a quarter of the tolerance, an error falls to a third or a fourth, but the error of a radius may fall to a half.
+# With a quarter of the tolerance, most errors fall to a third or a fourth, but the error of a radius may fall only to a
+# half, as at order 1. The error of `history` is usually proportional to the width of a cell.
 ORDER = 1
 
 
@@ -64,8 +65,9 @@ def checked_exact(
     places : array
         Positions at which functions of position are compared, in units of a0.
     accuracy : float, optional
-        Allowed error of every output relative to its largest value. Without an accuracy, the errors of a solution with
-        the default tolerance are estimated.
+        Allowed error of every output relative to its largest value. If no tolerance meets the accuracy, the solution
+        with the smallest tolerance is returned. Without an accuracy, the solution with the default tolerance is
+        returned. In both cases, the errors of this solution are estimated.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def checked_history(
     """Return the contact at the end of every block of load on a grid with `cells` cells up to the radius `reach`.
 
     The errors are estimated from solutions with 1/2 and 1/4 of the cells. `outputs` and `places` are those of
-    `checked_exact`.
+    `checked_exact`. A ValueError is raised if the contact reaches beyond the grid.
     """
 
     def solve(cells: int, which: IntArray) -> list[Worn]:
@@ -108,7 +110,7 @@ def _checked(
     outputs: Sequence[str],
     places: FloatArray,
 ) -> list[Checked]:
-    """Return contacts from the coarsest level on which all outputs meet the accuracy."""
+    """Return every contact from the coarsest level on which all outputs meet the accuracy, or from the finest level."""
     found: dict[tuple[int, int], Worn] = {}
     problems = []
 

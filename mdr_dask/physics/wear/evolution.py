@@ -22,7 +22,7 @@ from mdr_dask.physics.wear.slip import GrossSlip, Moment, PartialSlip
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 #: Largest ratio of a time step to the previous one, chosen by trial. BDF of order 3 is unstable only if the ratio stays
-#: above 1.618 in many successive steps; with this limit, more stated errors hold than with 1.618.
+#: above 1.618 in many successive steps. With 1.8, more of the stated errors hold than with 1.618.
 GROWTH = 1.8
 
 Problem = PartialSlip | GrossSlip
@@ -44,6 +44,7 @@ def march(
 
     The march ends with the first contact for which the time is at least `end`, or `stops` returns True. `tolerance` is
     the allowed error of the results of ``problem.worn`` in one time step. `first` is the length of the first time step.
+    If even a very short time step fails, NotConvergedError is raised.
     """
     newton = _Newton(problem)
     history = [settled(problem) if start is None else start]
@@ -63,7 +64,10 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as a solution of the discrete equations, to avoid a jump in the first time step."""
+    """Return the virgin contact as a solution of the discrete equations, to avoid a jump in the first time step.
+
+    If Newton's method fails, return the virgin contact as the problem gives it.
+    """
     virgin: Any = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem).solve(virgin.unknowns, 0.0, known)
@@ -71,7 +75,7 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
-    """Return the contact at a time, computed by additional time steps if the history lacks this time."""
+    """Return the contact at a time within the history, by additional time steps if the history lacks this time."""
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return history[before]
@@ -93,7 +97,8 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: float) -> tuple[Any, float]:
     """Take one time step with the BDF formula of the highest possible order. Return the contact and the error.
 
-    If the step fails, None is returned instead of the contact.
+    The order is the number of past contacts, but at most 3. If the step fails, None is returned instead of the contact,
+    and the error is infinite.
     """
     past = list(history[-1:-4:-1])
     order = len(past)
@@ -132,7 +137,10 @@ class _Newton:
     def _iterate(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
     ) -> FloatArray | None:
-        """Return the solution, or None if the changes grow, or if they shrink too slowly with a reused Jacobian."""
+        """Return the solution, or None if the iteration fails.
+
+        It also counts as a failure if the changes grow, or if they shrink too slowly with a reused Jacobian.
+        """
         is_reused, last = self.factors is not None, np.inf
         for _ in range(MOST_ITERATIONS):
             residual = self.problem.residual(unknowns, theta, known(unknowns))

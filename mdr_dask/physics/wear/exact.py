@@ -30,22 +30,24 @@ from mdr_dask.physics.wear.worn import (
 )
 
 COARSEST = 1.6e-2  # largest `accuracy`, chosen by trial: coarser panels do not resolve steep bodies
-#: If N / sqrt(a^2 - c^2) exceeds this value, the limiting profile is returned. The difference from the limiting profile
-#: falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), and is then below the rounding error.
+#: If N / sqrt(a^2 - c^2) reaches this value, where a is an upper bound of the contact radius, the limiting profile is
+#: returned. The difference from the limiting profile falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), and is
+#: then below the rounding error.
 ENDED = 1e4
-JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta in the panel next to the border exceeds this value
+JUMP = 0.1  # the border no longer moves if y = 1 - (d - g) / eta at the outer end of the first panel exceeds this value
 
 
 class Resolution(NamedTuple):
-    """Panels and time steps for a given `accuracy`, which is the allowed error of the profile f divided by eta d0."""
+    """Panels and time steps for a given `accuracy` (see `exact`)."""
 
     accuracy: float
 
     @property
     def order(self) -> int:
-        """Number of nodes in a panel: one more for a quarter of the allowed error.
+        """Number of nodes in a panel.
 
-        Panels far from border and edge are never halved.
+        If the allowed error falls to a quarter, a panel has one more node, because the panels far from the border and
+        the edge do not become narrower.
         """
         return 2 + round(float(np.log(COARSEST / self.accuracy) / np.log(4.0)))
 
@@ -94,10 +96,10 @@ def exact(
         df/ds = p in the whole contact.
     amounts : sequence of float
         Cycles N >= 0 in units of N0, or, in gross slip, s = k E* l / (sigma0 a0) for the sliding distances l. The
-        amounts may be in any order. An infinite value gives the limiting profile of partial slip.
+        amounts may be in any order. In partial slip, an infinite value gives the limiting profile.
     accuracy : float
-        Allowed error of f, divided by eta d0. The worn depth is of the order of eta d0. Errors below `ERROR` are not
-        reached, because round-off accumulates over the time steps.
+        Allowed error of f, divided by eta d0 in partial slip (where the worn depth is of the order of eta d0), and by
+        d0 in gross slip. Errors below `ERROR` are not reached, because round-off accumulates over the time steps.
     constant_force : bool
         Whether the force of the virgin contact is kept constant instead of the depth.
 
@@ -140,7 +142,11 @@ def operations(accuracy: float, *, constant_force: bool) -> float:
 def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
-    """Return the contact after each wanted number of cycles. All contacts are taken from the same solution."""
+    """Return the contact after each wanted number of cycles.
+
+    After very many cycles (see `ENDED`), the contact is the limiting profile. All earlier contacts are taken from the
+    same solution.
+    """
     c = _moved(profile, stick_radius, resolution.flat) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
@@ -289,7 +295,7 @@ def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return radii between c and the border at which integrals are split; they are closest together at the border."""
+    """Return radii from c to the border at which integrals are split, closer together near the border."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
@@ -304,7 +310,8 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
     if constant_force:
         problem = replace(problem, force=problem.normal_force(problem.start().unknowns))
     moments = march(problem, wanted[-1], resolution.step, resolution.step)
-    # all solutions share an error: a point that the edge passes within a time step wears only after this step
+    # the radius has an error that may be equal at all accuracies: a point that the edge passes within a time step wears
+    # only after this step
     return {
         path: replace(contact, radius_error=resolution.accuracy * contact.contact_radius)
         for path, contact in ((path, _slid_contact(problem, at(problem, moments, path))) for path in wanted)
@@ -316,7 +323,7 @@ def _slid_contact(problem: GrossSlip, moment: Moment) -> Worn:
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated
     image, a = problem.image(unknowns), problem.edge(unknowns)
 
-    # by the wear law, V = int F ds
+    # at constant force, the wear law gives V = int F ds
     volume = np.pi * a**2 * panels.weights @ worn if problem.force is None else problem.force * moment.time
 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:

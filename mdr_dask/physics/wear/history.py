@@ -1,7 +1,7 @@
 """Wear under a sequence of load blocks, each with a constant amplitude and a constant depth or force.
 
-The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
-slip in a block is partial or gross. The grid is uniform, because the image has a kink or a jump at the stick border of
+The wear rate is df/dN = p(r) s(r), where the slip s is the half-integral of the positive part of 1 - (d - g) / eta.
+Slip in a block is partial or gross. The grid is uniform, because the image has a kink or a jump at the stick border of
 every earlier block.
 """
 
@@ -22,8 +22,9 @@ from mdr_dask.physics.wear.worn import Worn
 class LoadBlock:
     """Load cycles of constant amplitude, at constant `depth` (unit d0) or constant `force` (unit E* d0 a0).
 
-    `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is
-    eta = G* U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross. An infinite eta means sliding.
+    `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is eta = G*
+    U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross. An infinite eta means sliding in one
+    direction, and `cycles` is then k E* l / (sigma0 a0) for the sliding distance l.
     """
 
     cycles: float
@@ -36,7 +37,9 @@ def history(profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, 
     """Return the contact at the end of every block. The virgin body has the contact radius 1 at the depth 1.
 
     The error is about proportional to the cell width. After a block in which the image gets a jump, the error is about
-    proportional to the square root of the cell width. `reach` is the largest radius of the grid in units of a0.
+    proportional to the square root of the cell width. `reach` is the largest radius of the grid in units of a0. If
+    the table of the profile ends at a smaller radius, the grid ends there. If the contact reaches beyond the grid, a
+    ValueError is raised.
     """
     grid = uniform_grid(cells, min(reach, profile.largest_radius))
     image_0 = profile.image(grid.nodes)
@@ -59,7 +62,7 @@ def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: Lo
         return np.asarray(grid.pressure(image, depth) * (grid.inverse @ free))
 
     while done < block.cycles:
-        step = min(0.85 * grid.spacing, block.cycles - done)  # in cycles; half of the largest stable step
+        step = min(0.85 * grid.spacing, block.cycles - done)  # in units of N0; half of the largest stable step
         first = rate(worn)
         worn = worn + 0.5 * step * (first + rate(worn + step * first))
         done += step

@@ -1,8 +1,9 @@
 """The fast rule of the thesis for wear at constant depth, and the limiting profile, for any body of revolution.
 
-In the fast rule (thesis eq. 6.11), the image g depends on the number of cycles N through `rest` = exp(-xi N / a(c)). Up
-to x = 1, y = (g - g0(c)) / (1 - g0(c)) follows a logistic law. Beyond x = 1, g - 1 is the fraction `rest` of g0 - 1. In
-the limiting profile (eqs. 6.8-6.10), `rest` is zero.
+In the fast rule (thesis eq. 6.11), the image g depends on the number of cycles N through `rest` = exp(-xi N / a(c)),
+where a(c) is the scar radius of the limiting profile. From the stick radius c to x = 1, y = (g - g0(c)) / (1 - g0(c))
+follows a logistic law. Beyond x = 1, g - 1 is the fraction `rest` of g0 - 1. In the limiting profile (eqs. 6.8-6.10),
+`rest` is zero.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from mdr_dask.physics.wear.worn import (
 )
 
 #: Each piece of integration ends this many times farther from the stick border than the piece before (chosen by trial).
-#: The third piece ends 900 widths of the first piece from the stick border. There, y of the logistic law differs from
-#: its limit 1 by about 1/900.
+#: The third piece ends 30^2 = 900 widths of the first piece from the stick border. There, y of the logistic law differs
+#: from its limit 1 by about 1/900.
 LAYER_GROWTH = 30.0
 ERROR = 2e-6  # numerical error of every output, divided by its largest value; without the error of the fast rule itself
 
@@ -122,7 +123,7 @@ def _scar(profile: Profile, c: float, rest: float) -> Scar:
 
 
 def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> FloatArray:
-    """Return contact radius, wear volume and normal force of limiting profiles of power-law bodies, shape (3, ...)."""
+    """Return scar radius, wear volume and normal force of limiting profiles of power-law bodies, shape (3, ...)."""
     parts = np.broadcast_arrays(exponent, stick_radius)
     cases = np.array([np.ravel(part) for part in parts], dtype=float)
     return _limits(cases).reshape((3, *parts[0].shape))
@@ -209,10 +210,11 @@ def _angle(x: float, radius: float) -> float:
 
 @jit
 def _scar_radius(rule: Rule, low: float, low_value: float, high: float, high_value: float, cuts: FloatArray) -> float:
-    """Return the radius between `low` and `high` at which `_scar_integral` vanishes, or `low` if nothing is worn.
+    """Return the radius between `low` and `high` at which `_scar_integral` vanishes.
 
-    `low_value` and `high_value` are the values of the integral at `low` and `high`. The root is found by the method of
-    false position with the improvement by Anderson and Björck.
+    `low_value` and `high_value` are the values of the integral at `low` and `high`. If `low_value` is not positive,
+    nothing is worn, and `low` is returned. If `high_value` is not negative, `high` is returned. The root is found by
+    the method of false position with the improvement by Anderson and Björck.
     """
     if not low_value > 0.0:
         return low
@@ -251,7 +253,7 @@ def _limit_radius(rule: Rule) -> float:
 
 @jit
 def _numbers(rule: Rule, limit: float) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force."""
+    """Return scar radius, volume and normal force. `limit` is the scar radius a(c) of the limiting profile."""
     cuts = _cuts(rule)
     radius = limit
     if rule.rest > 0.0:

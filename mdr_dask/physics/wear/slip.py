@@ -22,8 +22,8 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.refine import CLOSE
 
-#: Weight of the stick border in the error of a time step, relative to the weight of the depth. The weight is large
-#: because f rises like a square root beyond the border.
+#: In the error of a time step, the weight of the stick border is this factor times (1 - c) / eta, and the weight of the
+#: depth is 1. The factor is large because f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
 _ABSCISSA, _WEIGHT = gauss(3)
 
@@ -92,9 +92,9 @@ class Past(NamedTuple):
 class SlipMoment(Moment):
     """A contact in partial slip at one time.
 
-    `path`, shape (2, k), contains the stick border and the depth at the start, and after every time step in which the
-    border moved. Between these points, the depth is a linear function of the border. `moved`, one value per node, is
-    the rise of f_star along the whole path (see `PartialSlip`).
+    `path`, shape (2, k), contains the stick border and the depth (see `Place`) at the start, and after every time step
+    in which the border could move. Between these points, the depth is a linear function of the border. `moved`, one
+    value per node, is the rise of f_star along the whole path (see `PartialSlip`).
     """
 
     path: FloatArray
@@ -103,7 +103,7 @@ class SlipMoment(Moment):
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip:
-    """Partial slip: outside the stick border b, the slip at height f of the worn profile is s = (f - f_star) / eta.
+    """Partial slip: outside the stick border b, the slip is s = (f - f_star) / eta, where f is the worn profile.
 
     If the border passes a radius when the depth is d1, the image there is g = d1 - eta from then on. At the depth d,
     f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While the plateau rises
@@ -271,7 +271,7 @@ class PartialSlip:
         return rows
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives of the residual with respect to y."""
+        """Return the derivatives of the residual with respect to y. The other columns are set in `evolution`."""
         place = self.place(unknowns)
         size, root, factor = self.size, np.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.slip(unknowns), self.rate(unknowns)
@@ -298,7 +298,10 @@ class PartialSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities whose errors limit the time step: s and, under constant force, depth and border."""
+        """Return the quantities whose errors limit the time step.
+
+        These are s, under constant force also the depth, and, as long as the border moves, the weighted border.
+        """
         weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -445,7 +448,7 @@ class GrossSlip:
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     def admits(self, unknowns: FloatArray) -> bool:
-        """Return True, because all known solutions of the equations are possible contacts."""
+        """Return True, because no solution of the equations is known that is impossible as a contact."""
         return True
 
     def start(self) -> Moment:
@@ -508,7 +511,7 @@ class GrossSlip:
         return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives of the residual with respect to g."""
+        """Return the derivatives of the residual with respect to g. The other columns are set in `evolution`."""
         a, nodes = self.edge(unknowns), self.panels.nodes.size
         result = np.zeros((unknowns.size, unknowns.size))
         result[:nodes, :nodes] = self.panels.full

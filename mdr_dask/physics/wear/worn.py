@@ -1,8 +1,8 @@
 """The class `Worn` for a worn contact, and the integrals for profile, pressure and volume.
 
 The image g(x) is the MDR line of the profile f(r). Lengths are divided by a0, heights by d0, pressures by E* d0 / a0,
-volumes by a0^2 d0, and numbers of cycles by N0 = a0 sigma0 / (4 U0 k E*). Heights f are measured upwards from the
-virgin apex. Wear increases f.
+forces by E* d0 a0, volumes by a0^2 d0, and numbers of cycles by N0 = a0 sigma0 / (4 U0 k E*). Heights f are measured
+upwards from the virgin apex. Wear increases f.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ class Worn:
     Parameters
     ----------
     contact_radius : float
-        Radius of the wear scar. Beyond the scar, f = f0. In an exact evolution, the contact ends at the same radius.
+        Radius of the wear scar, beyond which f = f0. In an exact evolution, the contact ends at the same radius. In
+        `history`, radius of the contact, which may be smaller than the scar of earlier blocks.
     stick_border : float
         Radius up to which the contact sticks; 0 in gross slip.
     depth, normal_force : float
@@ -43,7 +44,7 @@ class Worn:
     relative_error : float
         Known error of every attribute, divided by its largest value.
     radius_error : float
-        Known error of both radii. Solutions of different resolution may agree within this error by chance.
+        Known absolute error of both radii. Solutions of different resolution may agree within this error by chance.
     """
 
     contact_radius: float
@@ -84,7 +85,10 @@ class Scar(NamedTuple):
 
 
 def worn_height(scar: Scar, radius: FloatArray) -> FloatArray:
-    """Return the worn depth f - f0 = (2/pi) int_c^r (g - g0) / sqrt(r^2 - x^2) dx at r > c, with x = r cos(phi)."""
+    """Return the worn depth f - f0 = (2/pi) int_c^r (g - g0) / sqrt(r^2 - x^2) dx at radii r > c.
+
+    The substitution x = r cos(phi) removes the square root.
+    """
     c = scar.border
     cuts = [c, *sorted(b for b in scar.breaks if b > c)]
     total = np.zeros_like(radius)
@@ -111,7 +115,8 @@ def worn_volume(scar: Scar) -> float:
 def closed(profile: Profile, scar: Scar, high: float = 1.5) -> Scar:
     """Return the scar with its radius, at which worn and virgin profile meet. If nothing is worn, the radius is 1.
 
-    `high` is a first estimate of an upper bound of the radius.
+    `high` is a first estimate of an upper bound of the radius. If the scar reaches beyond the table of the profile, a
+    ValueError is raised.
     """
 
     def depth(radius: float) -> float:
@@ -213,7 +218,7 @@ def worn_by(
 
 
 def deepest(depth: Function, places: FloatArray) -> float:
-    """Return the maximum of the worn depth. `places` are so dense that there is one maximum between neighbours."""
+    """Return the maximum of the worn depth. Two neighbours of `places` must have at most one maximum between them."""
     values = depth(places)
     k = int(np.argmax(values))
     bounds = places[max(k - 1, 0)], places[min(k + 1, places.size - 1)]

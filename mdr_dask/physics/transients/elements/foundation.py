@@ -1,8 +1,8 @@
 """Motion of one element of a viscoelastic foundation: at constant speed in contact, or in free recovery.
 
-In all functions, `terms` contains the strains of the dashpots of the Prony terms, with one row for each element, and i
-is the index of one element. Functions take the index, because slicing an array would take longer. The static modulus
-is 1, and the line has the length 1.
+The argument `terms` contains the strains of the dashpots of the Prony terms, with one row for each element, and i is
+the index of one element. Functions take the index, because slicing an array would take longer. The static modulus is 1,
+and the line has the length 1.
 """
 
 from __future__ import annotations
@@ -211,7 +211,8 @@ def advance(
 
     The depth plus height of the line changes from w0 to w1. u0 is the displacement of the element at the start, and
     `touching` is True if the element is in contact at the start. `part` and `leaves` are results of :func:`release` for
-    an element in contact. If the element separates or stays free, `after` is its displacement at the end.
+    an element in contact. `after` is the displacement at the end of an element that separates or stays free. The
+    element is in contact at the end if w1 is larger than `after`.
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades

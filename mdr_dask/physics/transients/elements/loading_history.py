@@ -34,8 +34,8 @@ from mdr_dask.physics.transients.elements.steps import Edges, Schedule, State, f
 class Response(NamedTuple):
     """Forces and depth at every instant of a loading history, and the state of the elements at the end.
 
-    The drag is F_x / (4 G L), in the unit of height squared divided by the unit of length. `contact` is the fraction of
-    the line in contact.
+    The drag is F_x / (4 G_inf L), in the unit of height squared divided by the unit of length. `contact` is the
+    fraction of the line in contact. If a time step fails, all values from this step on are NaN.
     """
 
     drag: FloatArray
@@ -57,9 +57,9 @@ def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float
     """Return the state of the elements at the nodes in steady sliding, the depth, and the outcome.
 
     The solver of steady sliding finds the depth and, on a periodic line, the stretches of the Prony terms at the
-    highest node. One element is then moved along the line, by the method of :func:`follow_line`. Both use a line with
-    an additional node in the middle of every cell. At ``deborah = 0`` the elements are in equilibrium at rest under the
-    load.
+    highest node. One element is then moved along the line, by the method of :func:`follow_line`. Both calculations use
+    a line with an additional node in the middle of every cell. At ``deborah = 0`` the elements are in equilibrium at
+    rest under the load.
     """
     state, outcome = untouched(line.height.size - 1, solid.times.size), Outcome.CONVERGED
     if deborah > 0:
@@ -124,7 +124,7 @@ def _pass_along(
     """Move one element along the line at constant depth, and write the state of all elements.
 
     At the node `first`, the dashpots of the Prony terms have the given `strains`. On a periodic line, the element is
-    moved along the line twice. Its state as a free element is known only after the first period.
+    moved along the line twice, because its state as a free element is known only after the first period.
     """
     n = line.height.size - 1
     # every k-th node belongs to an element, with k = `every`
@@ -214,7 +214,7 @@ class Piece:
 
     @property
     def changes_in(self) -> float:
-        """Characteristic time: period of the sine, duration of the ramp, or infinity for constant values."""
+        """Period of the sine or, without a sine, duration of the ramp; infinity if velocity and load are constant."""
         if self.swing[2]:
             return 2 * np.pi / self.swing[2]
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
@@ -253,9 +253,9 @@ class Trace(NamedTuple):
 
     The friction is F_x / F_N, in the unit of height divided by the unit of length. `before` is the friction in the
     steady state before t = 0. `at` is the friction just after t = 0. `after` is the friction in the final steady state.
-    `after` is NaN if the history does not end in steady forward sliding. At a jump, `friction` and `depth` are the
-    values just after the jump. `contact` is the largest fraction of the line in contact from t = 0 to the last
-    requested time.
+    `after` is NaN if the history does not end in steady forward sliding, or if this steady state is not found. At a
+    jump, `friction` and `depth` are the values just after the jump. `contact` is the largest fraction of the line in
+    contact from t = 0 to the last requested time.
     """
 
     before: float
@@ -321,8 +321,10 @@ def _steady_friction(
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
-    """Return the friction in the final steady state, or NaN if an oscillation, rest or backward sliding ends the
-    history.
+    """Return the friction in the final steady state.
+
+    The friction is NaN if the history ends in an oscillation, at rest or in backward sliding, or if the steady state is
+    not found.
     """
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:

@@ -231,7 +231,8 @@ class State(NamedTuple):
     """State of all elements at one instant: displacement u, strains of the dashpots of the Prony terms, contact or not.
 
     `free` and `free_terms` are the displacement and the strains that an element in contact would have if it had stayed
-    free. For a free element, `free` is the displacement, and `free_terms` is not used.
+    free. During contact, they are updated only if the solid has a dashpot. For a free element, `free` is the
+    displacement, and `free_terms` is not used.
     """
 
     displacement: FloatArray
@@ -319,8 +320,8 @@ class StepWorkspace(NamedTuple):
 
     `under` and `slope` are height and slope of the line at the end of the time step. `old_under` and `old_slope` are
     height and slope at the start. `after` is the displacement without contact at the end of the time step. `parts` and
-    `leaves` are results of :func:`release`. `gaps` is depth + h minus the displacement that an element would have
-    without contact. For a solid without a dashpot, `gaps` is a copy of `pulls`. `pulls` is the force of spring and
+    `leaves` are results of :func:`release`. If the solid has a dashpot, `gaps` is depth + h minus the displacement that
+    an element would have without contact. Otherwise, `gaps` is a copy of `pulls`. `pulls` is the force of spring and
     Prony terms of an element that follows the line. `force` is the total force of this element, and `power` is the
     product of total force and slope. `is_smooth` is True for elements in contact, and for all elements of a solid
     without Prony terms. With Prony terms, `force` has a kink at the edges of contact.
