@@ -2,8 +2,10 @@
 
 A cluster is an interval in which the sum ``z`` of the heights of both lines exceeds the film ``h0``. The cluster breaks
 the layer if ``int (z - h0) dx > s D^3``, with the length D of the interval and the result s of `layer_strength` (eqs.
-5.5, 5.6). The contact zone is a window that begins at each node in turn. Clusters are cut at the edges of the window.
-The lines are closed cubic splines: the first node follows the last node. All integrals are exact.
+5.5, 5.6). The contact zone is a window of the lines; in pure rolling, the window begins at each node in turn. Clusters
+are cut at the edges of the window. The length in intimate contact of a window, or briefly its length in contact, is the
+total length of the clusters in the window that break the layer. The lines are closed cubic splines: the first node
+follows the last node. All integrals are exact.
 """
 
 from __future__ import annotations
@@ -58,7 +60,10 @@ def _block(jumps: IntArray, begin: int, count: int, number: int) -> None:
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: IntArray) -> None:
-    """Add a cluster to the lengths in contact of all windows that contain only its beginning or only its end."""
+    """Add the parts of a cluster to the lengths in contact of all windows that contain one end of it.
+
+    Only parts that break the layer are added. No part that is longer than `reach` can break the layer.
+    """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
     longest = min(window, reach)
@@ -83,7 +88,10 @@ def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: In
 
 @jit
 def _add_middles(clusters: Clusters, c: int, window: float, jumps: IntArray) -> None:
-    """Add a cluster to the lengths in contact of all windows that lie entirely within this cluster."""
+    """Add a cluster to the lengths in contact of all windows that lie entirely within this cluster.
+
+    Only windows in which the cluster breaks the layer are changed.
+    """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
     first, last = (0, points - 1) if clusters.closed else (int(start) + 1, int(np.ceil(end - window)) - 1)
@@ -102,7 +110,10 @@ def _add_middles(clusters: Clusters, c: int, window: float, jumps: IntArray) -> 
 
 @jit
 def _collect(clusters: Clusters, window: float, jumps: IntArray) -> None:
-    """Write the lengths in contact of all windows to `jumps`, which must contain only zeros before the call."""
+    """Write the lengths in contact of all windows to `jumps`, which must contain only zeros before the call.
+
+    The last entry of `jumps` belongs to no window.
+    """
     points = jumps.size - 1
     # if a part of a cluster is longer than `reach`, this part cannot break the layer
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
@@ -160,7 +171,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window. `work` is workspace for ``z - h0`` and its zeros."""
+    """Return the length in intimate contact of a window, in parts. `work` is workspace for ``z - h0`` and its zeros."""
     pieces = int(np.ceil(window))
     overlap, found = work[: pieces + 3], work[pieces + 3 :]
     limit = pair.strength * pair.spacing**2

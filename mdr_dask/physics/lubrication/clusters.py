@@ -37,14 +37,14 @@ class Clusters(NamedTuple):
 
 @jit
 def whole_piece(overlap: FloatArray, k: int) -> float:
-    """Return the integral of a spline from node k to node k + 1."""
+    """Return the integral of `overlap` (see `Clusters`) from node k to node k + 1."""
     found: float = (overlap[k] + 11 * overlap[k + 1] + 11 * overlap[k + 2] + overlap[k + 3]) / 24
     return found
 
 
 @jit
 def total(overlap: FloatArray, start: float, end: float) -> float:
-    """Return the integral of a closed spline from `start` to `end`. The position `end` may lie beyond the last node."""
+    """Return the integral of `overlap` (see `Clusters`) from `start` to `end`, which may lie beyond the last node."""
     points = overlap.size - 3
     first, last = int(start), int(end)
     found: float = -integral(piece(overlap, first), start - first)

@@ -25,7 +25,8 @@ def _second_integral(x: float) -> float:
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
     """Replace the results of `_second_integral` at the nodes by integrals of ``ln|x|`` times the hat functions.
 
-    The hat function of a node is 1 at this node, 0 at all other nodes, and linear between nodes.
+    The hat function of a node is 1 at this node, 0 at all other nodes, and linear between nodes. The entries of the two
+    end nodes become 0.
     """
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
@@ -39,7 +40,10 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """For each inner node j, write the integral of ``ln|point - X|`` times the hat function of j to ``row[j]``."""
+    """For each inner node j, write the integral of ``ln|point - X|`` times the hat function of j to ``row[j]``.
+
+    The entries of the two end nodes are 0.
+    """
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)

@@ -151,12 +151,15 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, the factor from ``H = h R/a^2`` to ``h/R``."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. This factor converts ``H = h R/a^2`` to ``h/R``."""
     return 8 * W / np.pi
 
 
 class Moes(NamedTuple):
-    """Moes' load and lubricant parameters. The film ``h/R (2 U)^(-1/2)`` depends only on these two numbers."""
+    """Moes' load and lubricant parameters.
+
+    For an incompressible liquid with Barus' law, the film ``h/R (2 U)^(-1/2)`` depends only on these two numbers.
+    """
 
     M: FloatArray
     L: FloatArray
@@ -169,7 +172,8 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
 
 
 RIGID_ISOVISCOUS = 4.894968  # (h_min/R) W/U of a rigid parabola with the Reynolds exit condition (Kapitza)
-RIGID_PIEZOVISCOUS = 1.666297  # (h_min/R) (G U)^(-2/3) of a rigid parabola; largest isoviscous pressure 1/alpha (Blok)
+#: (h_min/R) (G U)^(-2/3) of a rigid parabola, at the film for which the largest isoviscous pressure is 1/alpha (Blok)
+RIGID_PIEZOVISCOUS = 1.666297
 ELASTIC_ISOVISCOUS = 2.05  # (h_min/R) M^(1/5) (2 U)^(-1/2) of soft bodies (Moes)
 
 

@@ -22,8 +22,9 @@ class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
     `central` is the film at ``X = 0``. `spacing` is the distance between two neighbouring nodes times the density of
-    nodes between them. This product is the same everywhere on the grid. The film under a piecewise linear pressure is
-    slightly too thin between the nodes. :meth:`film_between` therefore interpolates the films at the nodes.
+    nodes between them. This product is the same everywhere on the grid. It is NaN if the grid does not come from
+    `grids.aligned`. The film under a piecewise linear pressure is slightly too thin between the nodes.
+    :meth:`film_between` therefore interpolates the films at the nodes.
     """
 
     nodes: FloatArray
@@ -40,7 +41,7 @@ class GridSolution:
         return np.where(positions < self.nodes[0], np.nan, film)
 
     def pressure_between(self, positions: FloatArray) -> FloatArray:
-        """Return the pressure in units of p0 at positions in half widths, or zero where there is no film."""
+        """Return the pressure in units of p0 at positions in half widths, or zero outside the grid."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, 2), 0.0), 0.0)
 
@@ -85,7 +86,10 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Position where the film ends, extrapolated from the last four positive pressures."""
+        """Position where the film ends, extrapolated from the last four positive pressures.
+
+        If the extrapolation is impossible, the position of the first node without pressure downstream is returned.
+        """
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
         # the square root of the pressure falls to zero almost linearly
@@ -106,7 +110,7 @@ def cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Predict the result of `reading` on another grid from the results on one or two earlier grids.
+    """Predict the result of `reading` on a grid with a given spacing from the results on one or two earlier grids.
 
     With two grids, the error of the result is assumed to be proportional to the square of the spacing.
     """
@@ -119,7 +123,10 @@ def expected(
 
 @jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
-    """Interpolate at each position by the polynomial through `sides` nodes on each side of the position."""
+    """Interpolate at each position by the polynomial through `sides` nodes on each side of the position.
+
+    Near or beyond an end of the grid, the polynomial goes through the ``2 sides`` nodes at this end.
+    """
     result = np.empty(positions.size)
     for k in range(positions.size):
         low, high = sides, nodes.size - sides  # bisection for the first node at or beyond the position

@@ -10,7 +10,9 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-FLOODED = 300.0  # distance of a flooded inlet from X = -1, divided by sqrt(2 H(0)); relative error of the film: 2e-5
+#: Distance of a flooded inlet from X = -1, divided by sqrt(2 H(0)). Because the distance is finite, the film has a
+#: relative error of 2e-5.
+FLOODED = 300.0
 
 
 def inlet_position(central_film: float) -> float:

@@ -88,7 +88,7 @@ def line_contact(
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional
-        Viscosity at ambient pressure in Pa s, needed only for Roelands' law.
+        Viscosity at ambient pressure in Pa s, needed only for Roelands' law with a positive G.
     compressible : bool
         Whether the density follows the law of Dowson and Higginson.
     inlet : float, optional
@@ -97,8 +97,8 @@ def line_contact(
     Raises
     ------
     ValueError
-        If a number is not positive (G may be zero), the law is unknown, the inlet is not upstream, or the viscosity for
-        Roelands' law is missing or is not above ``exp(-9.67)`` Pa s.
+        If W, U, G or `E_star` is not positive (G may be zero), the law is unknown, the inlet is not upstream, or the
+        viscosity is needed but is missing or is not above ``exp(-9.67)`` Pa s.
     """
     W, U, G = groups
     for name, value in (("W", W), ("U", U), ("G", G), ("E_star", E_star)):
@@ -157,7 +157,7 @@ def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) ->
 def _solve_on(
     case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, clip: float, spacing: float = np.nan
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on one grid from a guess of the pressure at the nodes."""
+    """Solve on one grid from guesses of the pressure at the nodes and of the film at ``X = 0``."""
     grid = Grid.of(nodes)
     guess = pressure.copy()
     guess[0] = guess[-1] = 0.0
@@ -168,7 +168,10 @@ def _solve_on(
 
 
 def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return the solution whose density of nodes is used for all grids of `NODES`."""
+    """Return the solution whose density of nodes is used for all grids of `NODES`, and its outcome.
+
+    If no attempt converges, the result of the last attempt is returned.
+    """
     for (factor, starved, count), clip in zip(ATTEMPTS, CLIPS, strict=True):
         guess = factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
@@ -289,7 +292,10 @@ def solve_film(
 
 
 def operations(accuracy: float) -> float:
-    """Return the approximate number of operations of `solve_film`: 30 n^2 in each of ten steps on a grid of n nodes."""
+    """Return the approximate number of operations of `solve_film`.
+
+    On each grid of n nodes, ten Newton steps of 30 n^2 operations are assumed.
+    """
     # each finer grid divides the error by 8, because the error is of third order
     grids_needed = 1.0 if accuracy == 0 else min(np.log(1 / accuracy) / np.log(8) / len(NODES), 1.0)
     nodes = np.array([ATTEMPTS[0][-1]] * 3 + [*NODES[: round(grids_needed * len(NODES))]])

@@ -28,8 +28,8 @@ def mean_overlap(distance: float) -> float:
 def distance_of_means(gap: float) -> float:
     """Return the distance d (see `mean_overlap`) for a mean gap ``<(d - z)+>``, in units of the rms height."""
     gap = max(gap, float_info.min)
-    # `mean_overlap(-d)` is the mean gap. It is at least d, and at most exp(-d^2 / 2) / sqrt(2 pi) if d is negative.
-    # The logarithm of the mean gap varies slowly with d.
+    # `mean_overlap(-d)` is the mean gap, because -z has the same distribution as z. The mean gap is at least d, and,
+    # for negative d, at most exp(-d^2 / 2) / sqrt(2 pi). The logarithm of the mean gap varies slowly with d.
     least = -sqrt(max(-2 * log(gap * sqrt(2 * pi)), 0.0)) - gap
     return float(brentq(lambda d: log(max(mean_overlap(-d), float_info.min)) - log(gap), least, gap + 1))
 

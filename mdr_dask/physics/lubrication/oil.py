@@ -14,7 +14,7 @@ from mdr_dask.arrays import FloatArray
 
 _LUBRICANT_EXPANSION = 0.6278  # coefficient of expansion in 1/K times density in kg/m^3 at 60 F (ASTM D1250, table 54D)
 
-#: Pairs (s, t) of Gold's correlation ``alpha = s nu^t 1e-9``, with nu in mm^2/s, for each kind of oil.
+#: Pairs (s, t) of Gold's correlation ``alpha = s nu^t 1e-9``, alpha in 1/Pa and nu in mm^2/s, for each kind of oil.
 #: Only the pair for mineral oils could be confirmed (see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
@@ -150,7 +150,7 @@ class Oil:
         return f"expected a temperature within the oil's data, {ends}, got {temperature:.9g} K"
 
 
-#: Available oils, by name. The thesis (table A.1) does not state a pressure-viscosity coefficient.
+#: Available oils, by name. The thesis (table A.1) states no pressure-viscosity coefficient, so a correlation is used.
 OILS: dict[str, Oil] = {
     "mobilgear_shc_xmp_320": Oil(
         T1=313.15,

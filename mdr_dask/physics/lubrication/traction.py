@@ -1,7 +1,8 @@
 """Friction of a lubricated line contact due to the shear of the film.
 
 The film is computed for pure rolling and an isothermal Newtonian liquid. The slide-roll ratio must therefore be small.
-Heating and shear thinning would make film and traction smaller.
+Heating, which would make film and traction smaller, is neglected. Shear thinning, if an Eyring stress is given, reduces
+only the shear stress, not the film.
 """
 
 from __future__ import annotations
@@ -53,12 +54,12 @@ def sliding_coefficient(
 def uniform_film_coefficient(
     contact: HertzLine, stress: float, liquid: Liquid, eyring_stress: float, film_share: float = 1.0
 ) -> float:
-    """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
+    """Return the friction force of a uniform film under the Hertzian pressure, divided by the whole load.
 
-    `stress` is the Newtonian shear stress in Pa at ambient pressure, ``eta0 v/h``, and must not be zero. The shear
-    stress is ``tau_E asinh(tau/tau_E)``. Here, tau is the Newtonian stress at the pressure of the film, and tau_E is
-    `eyring_stress` in Pa. If tau_E is very large, the liquid is Newtonian. `film_share` is the fraction of the load,
-    and of the pressure, that the film carries. Rolling friction is not included.
+    `stress` is the Newtonian shear stress in Pa at ambient pressure, ``eta0 v/h`` with the sliding velocity v, and must
+    be positive. The shear stress is ``tau_E asinh(tau/tau_E)``. Here, tau is the Newtonian stress at the pressure of
+    the film, and tau_E is `eyring_stress` in Pa. If tau_E is very large, the liquid is Newtonian. `film_share` is the
+    fraction of the load, and of the pressure, that the film carries. Rolling friction is not included.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)

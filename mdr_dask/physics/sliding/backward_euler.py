@@ -33,8 +33,8 @@ CARRIED, STIFFNESS, DRAG, SUMS = range(4)
 # the sums of height, rise, height times rise, and rise squared over the nodes of the block
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 # Rows of `Lanes.state`, and their number. U is the displacement u, and FADE is du/d(depth). THROUGH is the factor by
-# which u decays over a free block. MEMORY is the sum of u over a free block if u is 1 just before the block.
-# LOAD, RATE and LOSS are the sums of u, of FADE and of the drag over the nodes of a block.
+# which u decays over a free block. MEMORY is the sum of u over a free block if u is 1 just before the block. LOAD, RATE
+# and LOSS are the sums over the nodes of a block: of u, of FADE, and of the terms of (1 - lambda) F_x / (4 G).
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS, ROWS = range(8)
 
 
@@ -212,7 +212,8 @@ def _newton(
     """Find the depth and the drag of every case, and replace the guesses in `depths` by the solutions.
 
     Newton's method approaches the solution from above, because the load is a convex, increasing function of the depth.
-    The drag is extrapolated from the last two sweeps to the final depth. If no depth is found, the drag is NaN.
+    The drag is extrapolated from the last two sweeps to the final depth. If no depth is found, the guess is kept and
+    the drag is NaN. `outside` receives whether an end of a line that is not periodic is in contact.
     """
     count = depths.size
     active, before = np.arange(count), np.full((2, count), np.nan)
@@ -228,7 +229,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # beyond the end of a line that is not periodic, both u and du/d(depth) decay exponentially
+            # beyond the end of a line that is not periodic, both u and du/d(depth) decay by lambda per node
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
@@ -277,10 +278,10 @@ def contact(
 def steady_by_steps(
     height: FloatArray, periodic: bool, deborah: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return the penetration of the highest node, F_x / (4 G), and whether an end of the line is in contact.
+    """Return for each case the penetration of the highest node, F_x / (4 G), and whether an end is in contact.
 
-    A periodic line must end at the highest node. Deborah numbers are v tau / dx. Loads are F_N / (4 G dx), in the unit
-    of height.
+    If no depth is found, F_x / (4 G) is NaN. A periodic line must end at the highest node, and never has an end in
+    contact. Deborah numbers are v tau / dx. Loads are F_N / (4 G dx), in the unit of height.
     """
     depths = first_depths(loads / height.size)
     drags, outside = np.empty(loads.size), np.zeros(loads.size, np.bool_)

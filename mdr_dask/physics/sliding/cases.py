@@ -57,7 +57,7 @@ class Steady:
     contact_fraction : array
         Fraction of the length of the line that is in contact.
     contact_slope : array
-        rms slope of the part of the line that is in contact.
+        rms slope of the part of the line that is in contact, in the unit of height over the length of the line.
     status : int8 array
         Values of `Outcome`.
     """

@@ -1,8 +1,9 @@
-"""Full contact of any linear solid with a rough plane, a linear problem that is solved separately for each wave.
+"""Full contact of any linear solid with a rough plane.
 
-The displacement is u = d + h, with the depth d and the height h. The height is a sum of waves. Wave k, with the
-wavenumber q_k and the amplitude c_k, causes a pressure of amplitude G*(q_k v) c_k, where G* is the complex modulus
-(thesis eq. 3.14 for the Kelvin solid). The drag is therefore a sum over the spectrum and does not depend on the phases.
+The problem is linear, and is solved separately for each wave. The displacement is u = d + h, with the depth d and the
+height h. The height is a sum of waves. Wave k, with the wavenumber q_k and the amplitude c_k, causes a pressure of
+amplitude G*(q_k v) c_k, where G* is the complex modulus (thesis eq. 3.14 for the Kelvin solid). The drag is therefore a
+sum over the spectrum and does not depend on the phases.
 
 Contact is full if the pressure is positive everywhere. The pressure is computed at m nodes, two for each Nyquist point.
 Between the nodes, the varying part of the pressure may be larger than at the nodes, but at most by a factor of

@@ -55,7 +55,7 @@ class Barriers(NamedTuple):
 
 
 def barriers_for(cells: int) -> Barriers:
-    """Return empty arrays for the barriers of a line with the given number of cells."""
+    """Return arrays for the barriers of a line with `cells` cells. No barrier is computed yet: `block` contains NaN."""
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
 
 
@@ -218,8 +218,8 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
     """Return the load, d(load)/d(depth), the drag and d(drag)/d(depth) of a free recovery.
 
-    The derivative of the drag includes the shift of the place where contact begins again. At this place, the line has
-    the slope `slope`.
+    The recovery begins with the displacement u, and extends over the distance `travelled`. The derivative of the drag
+    includes the shift of the place where contact begins again. At this place, the line has the slope `slope`.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -230,7 +230,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells in which a free element stays free. Return the next cell, and u at the start of this next cell."""
+    """Skip cells from cell i on in which a free element stays free. Return the next cell, and u at its start."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -277,7 +277,7 @@ def sweep_cells(
     # `left` is the place where the last contact ended, `u` is the displacement at this place,
     # and `free` is the displacement at the start of the current cell
     u = free = left = 0.0
-    # a period ends at the highest point, inside the last cell; the last cell is a copy of the first cell
+    # if the highest point is inside cell 0, a period ends inside cell n, which is a copy of cell 0
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:

@@ -34,7 +34,10 @@ def alpha(hurst: Any) -> Any:
 
 
 def full_contact(force: Any, velocity: Any) -> Any:
-    """Return mu / slope in full contact. The underlying law mu = 4 eta v L slope^2 / F_N is exact (eq. 3.14)."""
+    """Return mu / slope in full contact, from `force_number` and `velocity_number`.
+
+    The underlying law mu = 4 eta v L slope^2 / F_N is exact (eq. 3.14).
+    """
     return 4 * math.sqrt(2) * velocity / force
 
 
@@ -56,7 +59,10 @@ def crossover(force: Any, exponent: Any, beta: Any) -> Any:
 def indenter_low(
     half_width: Any, velocity: Any, relaxation_time: Any, shear_modulus: Any, force: Any, slope: Any
 ) -> Any:
-    """Return mu of a rough indenter at low velocity, 8 G a tau v slope^2 / F_N (eq. 3.34 with L_cont = 2a)."""
+    """Return mu of a rough indenter at low velocity, 8 G a tau v slope^2 / F_N.
+
+    This is eq. 3.34 with the contact length L_cont = 2a, where a is `half_width`.
+    """
     return 8 * shear_modulus * half_width * relaxation_time * velocity * slope**2 / force
 
 

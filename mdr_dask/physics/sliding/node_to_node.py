@@ -2,10 +2,10 @@
 
 The unit of length is the cell width, which is the distance between neighbouring nodes. The Deborah number De is the
 distance v tau divided by the cell width. Inside a cell, the penetration w (depth plus height) is a cubic. The places
-where contact begins and ends are computed approximately. The load is the integral of w over the contact, plus
-the integral of the displacement u over the rest of the line. The drag is the integral of De w'^2 over the contact, plus
-the integral of u^2 / De over the rest. All integrands of the drag are positive, so that nothing cancels in slow
-sliding.
+where contact begins and ends are computed approximately. The load F_N / (4 G dx) is the integral of w over the contact,
+plus the integral of the displacement u over the rest of the line. The drag F_x / (4 G) is the integral of De w'^2 over
+the contact, plus the integral of u^2 / De over the rest. All integrands of the drag are positive, so that nothing
+cancels in slow sliding.
 
 If a block of cells is entirely in contact or entirely free in a case, the sums over the block have closed forms. In all
 other blocks, the solver follows one element from cell to cell. The results of a case do not depend on other cases in
@@ -51,9 +51,9 @@ class Nodes(NamedTuple):
 
     `height` is measured from the first node, which has the height `top` on the original line. `slope` is the rise per
     cell. `ends` contains the corrections from `_ends_of`, or is empty. The arrays `height`, `slope` and `ends` begin
-    with the last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. `rise`
-    is the height of the highest point above the first node. The highest point is in the cell before the first node. On
-    coarse grids, `rise` is 0.
+    with the last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. If no
+    nodes of the original line are left out, the highest point is in the cell before the first node, and `rise` is the
+    height of this point above the first node. On coarser grids, `rise` is 0.
     """
 
     height: FloatArray
@@ -198,9 +198,10 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write the tile for `cells` cells of the line, from node `first` on, and return the number of cells of the tile.
+    """Write the tile for `cells` cells of the line, and return the number of cells of the tile.
 
-    Each cell of the line is divided into ``weights.shape[1]`` cells of the tile.
+    The first cell begins at the node with the index `first` in the arrays of `line`. Each cell of the line is divided
+    into ``weights.shape[1]`` cells of the tile.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
     # the exact corrections in `ends` are known only at the nodes of the line, not at the nodes of a finer tile
@@ -342,9 +343,9 @@ def _contact_end(
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return the place where a free element meets the line, and the fraction of u that remains at this place.
 
-    At the start of the cell, the displacement of the element is u. `inverse` is 1 / De. At the place `last` the gap
-    of a free element would be `gap_last` < 0. The first guess of the place is the zero of a parabola through the gaps
-    at the start of the cell and at `last`. One Newton step improves this guess.
+    At the start of the cell, the displacement of the element is u. `inverse` is 1 / De. At the place `last`, an element
+    that stayed free would have the gap u - w = `gap_last` <= 0. The first guess of the place is the zero of a parabola
+    through the gaps at the start of the cell and at `last`. One Newton step improves this guess.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + TINY)
@@ -368,8 +369,8 @@ def _contact_in_cell(
 
     At the start of the cell, the displacement of the element is u. If no contact began, the displacement at the end of
     the cell would be `kept`. The four numbers are: the place where the contact ends (1 if contact continues in the next
-    cell); w at this place; the fraction of w that remains at the end of the cell; and the gap that an element without
-    contact would have at this place.
+    cell); w at this place; the fraction of w that remains at the end of the cell; and the gap u - w that an element
+    without contact would have at this place. If no contact begins, the four numbers have no meaning.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -499,9 +500,10 @@ def sweep(
     queue: NDArray[np.int64],
     count: int,
 ) -> None:
-    """Move one element of every case along one period of the line, from the summit to the next summit.
+    """Move one element of every case through the cell of the summit, and then along one period of the line.
 
-    Blocks in which contact begins or ends are computed on a finer grid, which is interpolated with `weights`.
+    The sums in the workspace are those of the period. Blocks in which contact begins or ends are computed on a finer
+    grid, which is interpolated with `weights`.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -510,7 +512,8 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # first the cell of the summit, where every case is in contact, then the blocks, then the cells after the last block
+    # j = 0: the cell of the summit, in which every case is in contact somewhere, and whose sums are discarded; then the
+    # blocks, and finally the cells after the last block
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:
@@ -557,7 +560,8 @@ def _search(
     `accuracy`, and the displacement is periodic to this accuracy. `depths` contains guesses of the penetration of the
     summit, which are replaced by the solutions. `rates`, shape (cases, SECANTS), contains the derivatives of the
     logarithms of the results with respect to the depth, or NaN if unknown, and is updated. `results`, shape (cases,
-    SECANTS), receives drag, contact fraction and contact slope, and is not changed if no depth is found.
+    SECANTS), receives drag, contact fraction and contact slope. If no depth is found within `ITERATIONS` sweeps, the
+    entries of the case are not changed.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -650,6 +654,8 @@ class NodeToNode:
 
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
         """Return the results on a grid, with the possible errors due to a contact patch that the grid does not resolve.
+
+        With fewer than `RESOLVED` cells in contact, the outcome of a case is `DEPTH_NOT_FOUND`.
 
         A contact patch of at most about one cell may lie between two nodes, and be missing on two successive grids. The
         missing patch makes the length in contact too small. Because the slope is small near a summit, the missing patch

@@ -1,9 +1,10 @@
 """Steady sliding of a solid over a line, in dimensionless quantities. A case is a pair of speed and load.
 
 A Kelvin solid has no friction on a smooth plane. Full contact of any solid with a rough plane has a closed form, which
-is used if `oversampling` is "auto". All other cases are solved by one of three modules:
+is used if `oversampling` is "auto" and the scheme is "hermite". All other cases are solved by one of three modules:
 
-* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane if `oversampling` is "auto";
+* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane, also only if `oversampling` is "auto" and the
+  scheme is "hermite";
 * `steady` (sweeps over cubic cells, or backward Euler) for all other cases of a Kelvin solid, and for cases in which
   `node_to_node` misses the accuracy;
 * `viscoelastic` (sweeps over straight cells) for any other solid.
@@ -53,7 +54,7 @@ class Request:
     """The requested results, and either the requested accuracy or a given grid.
 
     `accuracy` is the allowed relative error (for small results see `FLOORS`). `oversampling` is the number of nodes per
-    Nyquist point, or "auto" for the smallest number of nodes that meets the accuracy. The scheme for a Kelvin solid is
+    Nyquist point, or "auto" for the smallest number that meets the accuracy. `scheme`, for a Kelvin solid only, is
     "hermite" (cubic cells) or "backward_euler" (the time steps of the thesis). If `with_errors` is False, the errors of
     a Kelvin solid on a given grid are not estimated. `contact` requests contact fraction and contact slope, which need
     finer grids than drag and depth.
@@ -81,7 +82,8 @@ def solve(
     v tau / L. The load is F_N / (4 G_inf L), in the unit of height.
 
     The errors are the absolute discretisation errors of `Steady.columns`, or infinite if the errors are not estimated.
-    If a case misses the accuracy even on the finest grid, the results and errors on the finest grid are returned.
+    If `oversampling` is "auto" and no solver meets the accuracy in a case, the results of the solver with the smallest
+    error of the drag are returned, on the finest grid on which this solver found a solution.
     """
     cases = Cases(deborah, loads)
     if terms is not None:
@@ -97,8 +99,9 @@ def solve(
     found = _on_grid(line, cases, request, grid, None)
     errors = np.full((4, loads.size), np.inf)
     if request.with_errors:
-        # on this grid, backward Euler is too far from convergence for an estimate from two grids, and one node per
-        # Nyquist point has no coarser grid; the errors are therefore the differences from an accurate solution
+        # an estimate from two grids is impossible: either backward Euler is too far from convergence on this grid, or
+        # there is no coarser grid, because this grid has only one node per Nyquist point; the error is therefore the
+        # difference from an accurate solution, plus the error of the accurate solution
         exact, errors = solve(line, None, *cases, Request(request.accuracy, contact=request.contact))
         errors = np.abs(found.columns - exact.columns) + errors
         errors[np.isnan(errors)] = np.inf
@@ -106,7 +109,7 @@ def solve(
 
 
 def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
-    """Solve every case of a Kelvin solid on the coarsest grid whose results meet the accuracy."""
+    """Solve every case of a Kelvin solid in closed form, or on the coarsest grid whose results meet the accuracy."""
     on_plane = request.scheme == "hermite" and line.body is None
     columns, errors, status = _in_full_contact(line, PronyTerms(), cases) if on_plane else _unsolved(cases)
     left = np.flatnonzero(valid(*cases) & (status != Outcome.CONVERGED))
@@ -130,9 +133,12 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 
 
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
-    """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
+    """Solve cases on finer and finer grids, by sweeps over cubic cells or by backward Euler.
+
+    With cubic cells, each search for the depth starts from the depth on the previous grid.
+    """
     depths = np.full(cases.loads.size, np.nan)
-    # contact fraction and slope are computed at a rounded depth; the rounding error may be equal on two grids
+    # contact fraction and slope are computed at a rounded depth; the effect of rounding may be equal on two grids
     unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -154,7 +160,10 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Store new results. An old solution is kept unless the new one is accurate or has a smaller error of the drag."""
+    """Write the new results of `cases` to `results`.
+
+    A converged old solution is kept unless the new solution meets the accuracy or has a smaller error of the drag.
+    """
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]
@@ -212,7 +221,7 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
 
 
 def _smooth_plane(cases: Cases) -> tuple[Steady, FloatArray]:
-    """Return the steady states on a smooth plane, where friction is zero."""
+    """Return the steady states on a smooth plane, where friction is zero, and errors of zero."""
     zero = np.zeros(cases.loads.size)
     status = np.where(valid(*cases), np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
     return Steady.of(np.array([zero, cases.loads, zero + 1, zero]), status), np.zeros((4, zero.size))

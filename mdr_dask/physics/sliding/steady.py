@@ -115,7 +115,7 @@ def _states(
 
     `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the entry of the case in
     `guesses`. If this entry is NaN, `_guess` computes the start from the previous case, or from `first` for the first
-    case. Return depth, load and d(load)/d(depth) of the first case that was solved.
+    case. Return depth, load and d(load)/d(depth) of the first case that was solved, or `first` if there is none.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))
@@ -155,7 +155,7 @@ def steady_sliding(
     loads : array, shape (cases,)
         F_N / (4 G L), which is the mean displacement, in the unit of height.
     guesses : array, shape (cases,), optional
-        Depths at which the searches start; the results do not depend on the guesses.
+        Penetrations of the mean line at which the searches start, or NaN. The results do not depend on the guesses.
 
     Returns
     -------
@@ -196,7 +196,7 @@ def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, con
 
     See `steady_sliding` for the first three arguments. Only the heights of the nodes are used. In each time step the
     body travels one cell. The error is proportional to the cell width. Contact fraction and contact slope take extra
-    computing time, and are computed only if `contact` is True.
+    computing time. They are computed only if `contact` is True, and are NaN otherwise.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -207,7 +207,10 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Convert lengths to cell widths, and solve the cases whose Deborah number and load are finite and positive."""
+    """Convert lengths to cell widths, and solve the cases whose Deborah number and load are finite and positive.
+
+    All other cases are `INVALID`. If the line contains a number that is not finite, all cases are `INVALID`.
+    """
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
@@ -228,7 +231,7 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
     deborah, loads, starts = cases.deborah[order], cases.loads[order], guesses[order]
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
-    first = float(loads[0] / n - mean), float(loads[0]), float(n)  # for full contact
+    first = float(loads[0] / n - mean), float(loads[0]), float(n)  # depth, load, d(load)/d(depth) in full contact
     barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):

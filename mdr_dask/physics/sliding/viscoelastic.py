@@ -136,7 +136,8 @@ def follow(direction: FloatArray, swept: Swept, periodic: bool, product: FloatAr
     `direction` contains the changes of the stretches e_m at the start of the line, then the change of the depth.
     `product` receives the changes of the integrals of all e_m, then the change of the integral of u. Shifts of the
     places where contact begins and ends are neglected, because the effect of a shift is of second order. If the line is
-    not periodic, the recovery beyond the end of the line is included. `workspace`, shape (3, terms), is overwritten.
+    not periodic, the integral of u includes the recovery beyond the end of the line. `workspace`, shape (3, terms), is
+    overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -275,7 +276,7 @@ def solve_sliding(
             # if the depth changes suddenly, each stretch changes by the same amount as the depth
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
-            # use the integral of the stress as the load, because the integral of u beyond the line may be unknown
+            # use the integral of the stress as the load, because the integral of u beyond the end may be unknown
             step[terms] = max((strain_area - totals[1]) / product[terms], -0.5 * unknown[terms])
         largest = 0.0
         for j in range(size):

@@ -112,9 +112,10 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 
 @jit
 def contact_point(low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray) -> float:
-    """Return the place t where a free element meets the straight line start + slope (t - low), with low <= t <= high.
+    """Return the distance t after which a free element meets the straight line start + slope (t - low).
 
-    Newton's method converges from `low` without overshooting, because the strain of a free element is convex in t.
+    The distance is counted from the place where the free recovery began, and lies between `low` and `high`. Newton's
+    method converges from `low` without overshooting, because the strain of a free element is convex in t.
     """
     point = low
     for _ in range(MOST_ITERATIONS):
@@ -163,11 +164,12 @@ def _next_contact(
 class Passage(NamedTuple):
     """The results of a sweep.
 
-    `lengths` alternately contains the lengths of free recoveries and of contacts. The first entry is the length of a
-    free recovery and may be 0. For n nodes, the array `lengths` needs at least 2 n + 2 entries. `imbalance` contains
-    the integral of each e_m over the line, which is 0 in the steady state on a periodic line. The six entries of
-    `totals` are: integral of u; integral of the stress; integral of the stress times the slope; length in contact;
-    integral of slope^2 over the length in contact; and integral of u beyond the end of the line.
+    In `lengths`, entries 0, 2, ... are the lengths of free recoveries, and entries 1, 3, ... are the lengths of
+    contacts. Entry 0 may be 0. For n nodes, `lengths` needs at least 2 n + 2 entries, of which a sweep uses only the
+    first ones (see `sweep_line`). `imbalance` contains the integral of each e_m over the line, which is 0 in the steady
+    state on a periodic line. The six entries of `totals` are: integral of u; integral of the stress; integral of the
+    stress times the slope; length in contact; integral of slope^2 over the length in contact; and integral of u beyond
+    the end of the line.
     """
 
     lengths: FloatArray
@@ -306,7 +308,8 @@ def begin_recovery(
 ) -> None:
     """Write the amplitudes of the recovery modes after the strain has suddenly decreased from `strain` by `excess`.
 
-    The stretch of the fastest Prony term is adjusted so that the stress is exactly zero.
+    `e` contains the stretches before the decrease, and is changed to the stretches after it. The stretch of the fastest
+    Prony term is adjusted so that the stress is exactly zero.
     """
     stress = strain - excess
     for m in range(moduli.size):

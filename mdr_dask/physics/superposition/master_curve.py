@@ -119,8 +119,9 @@ def superpose(
     """Find the shifts for which the curves are parts of one smooth curve, and the uncertainty of these shifts.
 
     The shifts, the smooth curve, the scatter and the vertical offsets have a joint probability density (module
-    `posterior`). Draws are taken from this density, and the results are means over the draws. The confidence intervals
-    of the results include the uncertainty of smoothness, scatter and offsets.
+    `posterior`). Draws are taken from this density. The shift factors are means over the draws, and the merged curve is
+    the most probable curve for the means of all parameters. The confidence intervals include the uncertainty of
+    smoothness, scatter and offsets.
 
     Parameters
     ----------
@@ -131,11 +132,11 @@ def superpose(
         (points,). The array y has the same shape, or the shape (channels, points) for channels that are shifted
         together, such as storage and loss modulus.
     vertical : {'none', 'modulus', 'compliance', 'free'}
-        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. With 'modulus'
-        or 'compliance', the known factor b_T = rho0 T0 / (rho T) is therefore applied; the density rho is computed with
-        `EXPANSION`. In addition, each curve has an unknown offset, which is the same for all channels of the curve and
-        has the prior `OFFSET`. With 'free', the factors are unknown and change from curve to curve by steps with the
-        prior `FREE`.
+        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. With 'modulus',
+        the known factor b_T = rho0 T0 / (rho T) is therefore applied, and with 'compliance' its inverse; the density
+        rho is computed with `EXPANSION`. In addition, each curve has an unknown offset, which is the same for all
+        channels of the curve and has the prior `OFFSET`. With 'free', the factors are unknown and change from curve to
+        curve by steps with the prior `FREE`.
     reference : float, optional
         Group, or value between two groups (see `rereference`), at which the factors are zero. None means the middle
         group.
@@ -147,7 +148,8 @@ def superpose(
     Raises
     ------
     DataError
-        If there are fewer than two curves, too few points, or points that are not finite.
+        If there are fewer than two curves, if two groups are equal, if a curve has fewer than two distinct points or
+        numbers that are not finite, if all curves are constant, or if the reference is outside the range of the groups.
 
     Examples
     --------
@@ -228,7 +230,7 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    # fit the curve to the points shifted by the mean shifts; on a plateau, the mean of drawn curves would miss them
+    # fit the curve to the points at their mean shifts; on a plateau, the mean of drawn curves would miss these points
     likeliest = solve(problem, rows.mean(axis=0)[None]).mean
     curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
     curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0
@@ -289,7 +291,7 @@ def rereference(
     The horizontal factor at the new reference is the factor of the law plus a deviation from the law. The deviation is
     interpolated linearly between the measured deviations at the two neighbouring groups. To include the error of this
     interpolation (see `interpolation_error`), a normally distributed number, with this error as standard deviation, is
-    added to each draw.
+    added to each draw. The vertical factor is interpolated linearly between the two groups.
 
     Parameters
     ----------
@@ -347,7 +349,8 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error ``(x - a) (b - x) |h''| / 2`` of the linear interpolation at x between the neighbours a and b.
 
-    h'' is the larger of the second derivatives of the factors at a and b.
+    h'' is the larger of the second derivatives of the factors at a and b. At the first and the last group, where no
+    second derivative is known, 0 is used.
     """
     after = int(np.clip(np.searchsorted(places, place), 1, places.size - 1))
     slopes = np.diff(factors) / np.diff(places)

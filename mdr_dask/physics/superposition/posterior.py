@@ -136,8 +136,9 @@ _SLOPES = np.arange(1, ORDER)[:, None] * _VALUES[1:]
 class Solved:
     """Density of the parameters, and distribution of the spline coefficients and offsets, for each row of parameters.
 
-    `energy` is the negative logarithm of the density, up to a constant. `mean` contains the mean coefficients of the
-    splines, channel by channel, then the offsets. `factor`, `gain` and `covariance` are U, G and C of `solve`.
+    `energy` is the negative logarithm of the density, up to a constant, and `gradient` contains its derivatives with
+    respect to the parameters. `mean` contains the mean coefficients of the splines, channel by channel, then the
+    offsets. `factor`, `gain` and `covariance` are U, G and C of `solve`.
     """
 
     energy: FloatArray

@@ -19,7 +19,7 @@ HOPS = 2
 CHAINS, KEPT = 24, 20
 """Number of chains, and number of moves of each chain that are kept. At least as many earlier moves are discarded.
 
-The 480 draws determine the ends of a 95 % interval to about 6 % of its half width.
+The 24 x 20 = 480 draws determine the ends of a 95 % interval to about 6 % of its half width.
 """
 
 CONVERGED = 1.1
@@ -32,8 +32,8 @@ STEPS = 3
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
-    For each pair of neighbouring curves, many values of the step between their two shifts are tried. Their
-    probabilities give the mean and the variance of the step, which are then combined with the prior of the shifts.
+    For each pair of neighbouring curves, many values of the step between their two shifts are tried. The probabilities
+    of these values give the mean and the variance of the step, which are then combined with the prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, 81)  # in widths of the wider of the two curves
     means, variances = [], []
@@ -68,7 +68,10 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
 
 @np.errstate(over="ignore", invalid="ignore")  # moves that diverge are rejected
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
-    """Return the curves, with the number of `splines` that was used, and a row of parameters for each draw."""
+    """Return the curves, with the number of `splines` that was used, and a row of parameters for each draw.
+
+    If the chains have not converged after the longest attempt, its draws are returned all the same.
+    """
     shifts = first_guess(curves)
     curves = laid_out(curves, shifts)
     start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
@@ -138,10 +141,11 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """In each row, draw one step again from its prior; return the new rows and the decrease of the log prior.
+    """In each row, draw one step again; return the new rows and the decrease of the log prior.
 
-    A step is the difference between the shifts of two neighbouring curves. On a plateau the density has many small
-    maxima; with jumps, a chain passes from one maximum to another.
+    The step is drawn from its prior, given the other steps. A step is the difference between the shifts of two
+    neighbouring curves. On a plateau the density has many small maxima; with jumps, a chain passes from one maximum to
+    another.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = np.linalg.inv(step_covariance(curves.count))

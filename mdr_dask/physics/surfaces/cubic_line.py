@@ -87,8 +87,9 @@ class Cells(NamedTuple):
 
     A periodic line starts in the cell of its highest point. Heights are relative to the highest point, so that small
     depths under light loads are not lost to rounding. `peak` is the largest height in each cell. `mean` is the integral
-    of the height over each cell, and `stretch` is the integral of the squared slope. A period begins at the highest
-    point. The position of this point in cell 0 is `start`, and its height is `top`.
+    of the height over each cell, and `stretch` is the integral of the squared slope. The highest point has the height
+    `top` on the original line. A period of a periodic line begins at this point, whose position in cell 0 is `start`.
+    If the line is not periodic, `start` is 0.
     """
 
     height: FloatArray
@@ -189,7 +190,7 @@ def running(integrals: FloatArray) -> FloatArray:
 def _turned(
     line: CubicLine, top: float, first: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the cells in order, starting with cell `first` and ending with a copy of this cell.
+    """Return the arrays of `Cells`, starting with cell `first` of the line and ending with a copy of this cell.
 
     Heights are relative to `top`.
     """

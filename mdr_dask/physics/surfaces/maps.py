@@ -25,7 +25,8 @@ FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points o
 class SurfaceMap(NamedTuple):
     """Heights on a regular grid, m, positive towards the elastomer; NaN for missing points.
 
-    `size` contains the lengths along x and y in m. A length is the number of points times the spacing.
+    `size` contains the lengths along x (axis 0) and y (axis 1) in m. A length is the number of points times the
+    spacing.
     """
 
     height: FloatArray
@@ -33,9 +34,10 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return the points that deviate from their neighbours by more than `FAR` standard deviations along both axes.
+    """Return a mask of points that deviate from their neighbours on both axes by more than `FAR` standard deviations.
 
-    The standard deviation is estimated from the median of the deviations.
+    The standard deviation is estimated from the median of the deviations. Points at the edges of the map are never in
+    the mask, and neither are points that deviate only because a neighbour is an outlier.
     """
     height = surface.height
     middle = height[1:-1, 1:-1]
@@ -58,7 +60,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def require_points(surface: SurfaceMap) -> None:
-    """Raise DataError if an axis has too few points, or if the fraction of missing points exceeds `MOST_MISSING`."""
+    """Raise DataError if an axis has fewer than 16 points, or if more than `MOST_MISSING` of the points are missing."""
     height = surface.height
     if height.ndim != 2 or min(height.shape) < 16:
         raise DataError(f"expected a map of 16 x 16 points or more, got {height.shape}")
@@ -74,7 +76,10 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
-    """Return a map in which each missing point is the mean of its four neighbours (Laplace's equation)."""
+    """Return a map in which each missing point is the mean of its neighbours (Laplace's equation).
+
+    DataError is raised as by `require_points`.
+    """
     require_points(surface)
     missing = ~np.isfinite(surface.height)
     return SurfaceMap(_harmonic(surface.height, missing), surface.size) if missing.any() else surface
@@ -141,9 +146,9 @@ class MapSpectrum:
     in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves that are
     statistically independent: 1 without a window, less than 1 with a window. `rms_height`, m, is the rms height of the
     windowed map. `slopes` contains the mean square of the slope along x and the mean square of the slope along y.
-    `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power. Both means are
-    0 for an isotropic surface. `cuts` contains the wave numbers and C_cut, m^3, of straight profiles: first along x,
-    then along y.
+    `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power, with the angle
+    from the x axis to the wave vector. Both means are 0 for an isotropic surface. `cuts` contains the wave numbers and
+    C_cut, m^3, of straight profiles: first along x, then along y.
     """
 
     wavenumber: FloatArray
@@ -161,10 +166,13 @@ class MapSpectrum:
         return float(np.sqrt(self.slopes[0] + self.slopes[1]))
 
     def spectrum(self) -> Spectrum:
-        """Return C2D from the first to the last ring with power above the rounding error."""
+        """Return C2D from the first to the last ring with power above the rounding error.
+
+        Rings between them whose power is below the rounding error get the smallest density of the other rings.
+        """
         there = np.flatnonzero(_above_rounding(self.wavenumber * self.density))
         rings = slice(there[0], there[-1] + 1)
-        least = self.density[there].min()  # density of the rings whose power is below the rounding error
+        least = self.density[there].min()
         return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], least))
 
     def binned(self) -> Cut:
@@ -202,7 +210,8 @@ class MapSpectrum:
 def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     """Return the spectrum of a map that has no missing points and no trend.
 
-    If `hann` is true, the map is multiplied by the window `hann_disc`. A periodic map needs no window.
+    If `hann` is true, the map is multiplied by the window `hann_disc`. A periodic map needs no window. If all heights
+    are equal, DataError is raised.
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()

@@ -41,7 +41,8 @@ def measured_line(
 
     The length of the period is the number of points times the mean spacing. At both ends, a cosine window reduces the
     heights towards their mean. `taper` is the fraction of the line that the window changes: 0.1 means 5 % of the line
-    at each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit.
+    at each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit. DataError is
+    raised if there are fewer than 8 pairs, if a number is not finite, or if the positions neither ascend nor descend.
     """
     x, z = _ordered(position, height)
     length = float(x[-1] - x[0]) * x.size / (x.size - 1)
@@ -74,7 +75,7 @@ def _window(points: int, taper: float) -> FloatArray:
 
 
 def detrended(height: FloatArray, order: Detrend) -> FloatArray:
-    """Return heights minus their least-squares polynomial."""
+    """Return heights minus a least-squares polynomial of degree `ORDERS[order]`, or a copy if `order` is "none"."""
     if order == "none":
         return height.copy()
     place = np.linspace(-1, 1, height.size)

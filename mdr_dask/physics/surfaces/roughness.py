@@ -46,7 +46,7 @@ def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 
     amplitude[k < longest * (1 - 1e-12)] = 0.0
     power = np.sum(amplitude**2) / 2
     if not power > 0:
-        raise ValueError(f"the longest wavelength must be above the cut-off wavelength: none of {modes} waves is left")
+        raise ValueError(f"the longest wavelength must be above the shortest wavelength: none of {modes} waves is left")
     unit: FloatArray = amplitude / np.sqrt(power)
     return unit
 

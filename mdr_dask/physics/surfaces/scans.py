@@ -17,7 +17,9 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BEND = 3.0  # prior standard deviation of the change of the slope d log C2D / d log q between adjacent bins
-STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value, far above that of roughness; by trial
+#: The spectrum ends where -d log C / d log q exceeds this value. It was chosen by trial, and is far above the values of
+#: roughness.
+STEEPEST = 30.0
 
 
 class Cut(NamedTuple):
@@ -81,7 +83,8 @@ def _until_the_end(cut: Cut) -> slice:
 def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
     """Return the isotropic spectrum C2D of a surface with the given cut, and the standard errors of log C2D.
 
-    The standard errors are large below the roll-off, where C2D hardly influences the cut.
+    The standard errors are large below the roll-off, where C2D hardly influences the cut. If the cut has fewer than
+    three wave numbers before its end (see `STEEPEST`), DataError is raised.
 
     C2D is assumed to be a power law between adjacent wave numbers of the cut, and is fitted by least squares. The fit
     amplifies noise less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the

@@ -39,7 +39,8 @@ def noise_limit(bins: Cut, roughness: float = -2.0, decades: float = 0.3) -> flo
 
     The tail comprises the last `decades` decades of the wave number. The slope d log C / d log q is 0 for noise, and at
     most `roughness` for a surface: -2 for C2D, and -1 for a straight profile. The tail is noise if its slope is closer
-    to 0 than to `roughness`. The spectrum is noise where the noise exceeds the roughness.
+    to 0 than to `roughness`. The spectrum is noise where the noise exceeds the roughness. If it does so everywhere, the
+    first wave number is returned.
     """
     wavenumber, density = bins.wavenumber, bins.density
     there = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)
@@ -53,7 +54,11 @@ def noise_limit(bins: Cut, roughness: float = -2.0, decades: float = 0.3) -> flo
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls too steeply for roughness, or infinity if there is no such fall."""
+    """Return the wave number beyond which C2D falls too steeply for roughness, or infinity if there is no such fall.
+
+    The fall must be steep over two successive intervals between bins, or over the last interval. Without such a fall,
+    but with bins in which C2D is zero, the wave number of the last bin with a positive C2D is returned.
+    """
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])

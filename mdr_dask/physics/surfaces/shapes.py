@@ -19,7 +19,7 @@ class PowerLaw:
 
     @classmethod
     def of_body(cls, coefficient: float, exponent: float) -> PowerLaw:
-        """Return the line of a body c r^n; the factor kappa_n of the line is pi/2 for a cone and 2 for a parabola."""
+        """Return the line -kappa_n c |x|^n of a body c r^n; kappa_n is pi/2 for a cone and 2 for a paraboloid."""
         kappa = 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
         return cls(kappa * coefficient, exponent)
 

@@ -117,7 +117,10 @@ class Spectrum:
 
 
 def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0, rolloff: float = 0.0) -> Spectrum:
-    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, constant above the wavelength `rolloff` (thesis 2.14)."""
+    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, with the rms height `rms` (thesis 2.14).
+
+    C2D is constant at wavelengths above `rolloff`; 0 means no roll-off.
+    """
     corners = sorted({2 * np.pi / end for end in (longest, shortest, rolloff) if end and shortest <= end <= longest})
     q = np.array(corners)
     bend = 2 * np.pi / rolloff if rolloff else 0.0
