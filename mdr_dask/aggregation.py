@@ -35,7 +35,7 @@ class Statistic:
 
 
 def has_biased_means(status: xr.DataArray) -> bool:
-    """Return whether a case has failed and successful realisations, so that the mean of the successful is biased."""
+    """Return whether any case has both failed and successful realisations; the mean of such a case may be biased."""
     if "realisation" not in status.dims:
         return False
     failed = status.isin([Status.FAILED.value, Status.NOT_CONVERGED.value]).any("realisation")
@@ -67,12 +67,16 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: the mean of the absolute errors."""
+    """Return the discretisation error of the mean: the mean of the known absolute errors; NaN if none is known."""
     return mean(abs(error))
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the lower and the upper end of the 95 % interval of the mean, along a new dimension ``bound``."""
+    """Return the lower and the upper end of the 95 % interval of the mean, along a new dimension ``bound``.
+
+    The interval includes the discretisation errors `error`; an unknown error counts as 0. The ends are NaN for a case
+    with fewer than two successful realisations.
+    """
     count = array.sizes["realisation"]
     if error is not None:
         array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
@@ -83,8 +87,8 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return the mean, the lower end and the upper end of the interval of the mean (see `interval`).
 
-    With one realisation, the interval is the mean plus or minus the discretisation error. If the discretisation error
-    is unknown, the ends are NaN.
+    If only one realisation of a case succeeded, the interval is the mean plus or minus the discretisation error. If
+    this error is unknown too, the ends are NaN.
     """
     array, error = array.compute(), None if error is None else error.compute()
     middle, ends = mean(array), interval(array, error)
@@ -98,8 +102,8 @@ def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.D
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the ends of the 95 % intervals of means, shape (..., 2).
 
-    The last axis of `values` contains the values of `count` realisations, and then the discretisation error of the mean
-    if it is known.
+    The last axis of `values` contains the values of `count` realisations. One more entry may follow: the discretisation
+    error of the mean, which counts as 0 if it is NaN.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
@@ -115,7 +119,7 @@ def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 
 
 def quantiles(array: xr.DataArray) -> xr.DataArray:
-    """Return the quantiles `QUANTILES` along a new last dimension ``quantile``, interpolated linearly."""
+    """Return the `QUANTILES` of the successful realisations along a new last dimension, interpolated linearly."""
     return _reduce(array, _quantiles, {}, "quantile", len(QUANTILES)).assign_coords(quantile=list(QUANTILES))
 
 
@@ -169,7 +173,10 @@ def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
-    """Return statistics over the realisations of a dataset, as variables ``<output>_<statistic>``."""
+    """Return statistics over the realisations of a dataset, as variables ``<output>_<statistic>``.
+
+    Outputs without the dimension ``realisation`` are left out. Raise DataError if a statistic does not exist.
+    """
     for name in statistics:
         if name not in NAMES:
             raise DataError(f"no statistic is called {name!r}{did_you_mean(name, NAMES)}")

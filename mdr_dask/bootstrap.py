@@ -1,8 +1,8 @@
 """Bootstrap intervals from the scatter of realisations and from the discretisation errors of results.
 
 A *stack* is an array with three kinds of rows, in this order: one row with the mean; `RESAMPLES` rows with means of
-resampled realisations; and rows in which the mean is shifted by discretisation errors. A fit is applied to every row,
-and `interval` computes the interval of a constant from the stack of fitted constants.
+resampled realisations; and pairs of rows in which the mean is shifted up and down by discretisation errors. A fit is
+applied to every row, and `interval` computes the interval of a constant from the stack of fitted constants.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ RESAMPLES = 400
 GROUPS = 32
 #: Cumulative probabilities at the lower and the upper end of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
-#: Smallest number of resamples from which the ends of an interval are computed.
+#: Smallest number of finite resamples from which the ends of an interval are computed: one resample in each tail.
 FEWEST = round(1 / TAILS[0])
 
 
@@ -37,7 +37,10 @@ def weights(count: int) -> FloatArray:
 
 
 def means(values: FloatArray) -> FloatArray:
-    """Return the stack of means of the finite values over the first axis (realisations)."""
+    """Return the stack of means of the finite values over the first axis (realisations), without rows for errors.
+
+    With fewer than two finite values, the rows of the resamples are NaN.
+    """
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
     drawn = weights(values.shape[0])
@@ -50,7 +53,7 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values; if a realisation (first axis) has a value that is not finite, all values in it become NaN."""
+    """Return the values; if a realisation (first axis) has a value that is not finite, all its values become NaN."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
@@ -58,7 +61,8 @@ def complete(values: FloatArray) -> FloatArray:
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     """For each group of neighbouring values, return all values twice: with this group shifted up, and shifted down.
 
-    A value is shifted by the error of this value. If the error is infinite, the value is shifted by its absolute value.
+    A value is shifted by the error of this value; if the error is NaN, by 0. If the error is infinite, the value is
+    shifted by its absolute value.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -71,15 +75,18 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return a stack with additional rows in which the mean is shifted by `errors` (see `moved`)."""
+    """Return a stack with additional rows in which the mean is shifted by `errors` (see `moved`).
+
+    If no error is positive, the stack is returned unchanged.
+    """
     return np.concatenate([stack, moved(stack[0], errors)]) if np.any(errors > 0) else stack
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference `one` minus `other` of two stacks with the same resamples.
 
-    The rows that follow the resamples are the difference of the means, shifted first by the errors of `one` and then
-    by the errors of `other`.
+    After the resamples come the rows that are shifted by the errors of `one`, and then the rows that are shifted by
+    the errors of `other`.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -101,18 +108,23 @@ def _reach(shifts: FloatArray) -> FloatArray:
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack in which errors shift groups of neighbouring cases instead of single cases."""
+    """Return a stack in which each row of errors shifts one group of neighbouring cases.
+
+    In the given stack, a row of errors may shift every case. The sum of the shifts of a case becomes its error.
+    """
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)
 
 
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of 95 % intervals from a stack; with `positive`, from the logarithms of the stack.
+    """Return the ends of 95 % intervals from a stack; with `positive`, computed from the logarithms of the stack.
 
-    With few realisations (`count`), the percentiles of the resamples lie too close to the mean. The distances of the
-    percentiles from the mean are therefore multiplied by `widening`. Shifts by discretisation errors are added
-    linearly, because an error that is the same in every realisation does not average out.
+    With few realisations (`count`), the percentiles of the resamples lie too close to the first row. The distances of
+    the percentiles from the first row are therefore multiplied by `widening`. Shifts by discretisation errors are added
+    linearly, because an error that is the same in every realisation does not average out. The ends are NaN for fewer
+    than two realisations, for fewer than `FEWEST` finite resamples, and if the value in the first row is not finite or,
+    with `positive`, not positive.
     """
     values = logarithms(stack) if positive else stack
     enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
@@ -128,7 +140,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return sqrt(n / (n - 1)) t / z for n = `count` realisations.
+    """Return sqrt(n / (n - 1)) t / z for n = `count` realisations; a `count` below 2 is replaced by 2.
 
     Here t is the 97.5 % quantile of Student's distribution with n - 1 degrees of freedom, and z is the 97.5 % quantile
     of the normal distribution.
@@ -145,7 +157,7 @@ def chance(residuals: FloatArray, count: int) -> float:
 
     `residuals` is a stack of the differences between data and law. If the law holds, the residuals of the data (first
     row) are about as large as the differences between these residuals and those of a resample. The result is NaN for
-    too few resamples.
+    fewer than two realisations, or too few resamples.
     """
     caused = _caused(residuals, count)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan

@@ -1,8 +1,8 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Every new value lies halfway between two older values. Cases that differ in other parameters therefore share values of
-the axis. To test an interval, the output is predicted from the results at older values only. The interval is
-halved if the error of the prediction exceeds the tolerance.
+Every new value lies halfway between two older values on the scale of the axis. Cases that differ in other parameters
+therefore share values of the axis. To test an interval, the output is predicted from the results at older values only.
+The interval is halved if the error of the prediction exceeds the tolerance.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
 #: Least width of an interval, as a fraction of the axis. This width limits the number of values at a discontinuity.
 FINEST = 2.0**-10
-#: Intervals are always halved until one end has at least this level. Level 1 is the middle of the axis, level 2 the
-#: quarters, and level 3 the eighths. The quarters are predicted from only three values, perhaps correctly by chance.
+#: Intervals with results at both ends are always halved until one end has at least this level. Level 1 is the middle of
+#: the axis, level 2 the quarters, and level 3 the eighths. The quarters are predicted from only three values, perhaps
+#: correctly by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
 #: the end that was added to the axis later, as fractions of the length of the interval. Chosen by trial.
@@ -33,7 +34,8 @@ class Means(NamedTuple):
     """Means of an output over realisations, and the data from which the errors of the means are estimated."""
 
     # Along the first axis: the means over all realisations, then, for each group of realisations, the means without
-    # this group. The other axes are the cases. A case without a successful realisation is NaN.
+    # this group. The other axes are the cases. A case without a successful realisation is NaN. If all successful
+    # realisations of a case are in one group, the mean over all realisations replaces the mean without this group.
     groups: FloatArray
     # Shape (cases...): discretisation error of the mean of each case, 0 for an unknown error.
     error: FloatArray
@@ -91,7 +93,7 @@ class Mesh:
         return found
 
     def along(self, number: int, cases: BoolArray) -> BoolArray:
-        """Return a view of `cases` with the dimensions (non-adaptive axes..., axis `number`, other adaptive axis)."""
+        """Return a view of `cases` with the dimensions (non-adaptive axes..., axis `number`, other adaptive axes)."""
         others = [k for k in range(cases.ndim) if k not in self.shares]
         return np.moveaxis(cases, [*others, number], range(len(others) + 1))
 
@@ -151,10 +153,11 @@ class _Interval:
 
 
 def refined(mesh: Mesh, means: Mapping[str, Means]) -> tuple[Mesh, dict[str, int]]:
-    """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
+    """Halve the intervals in which no test has yet shown that interpolation meets the tolerances; return the new mesh.
 
-    `means` contains the means of each output that has a tolerance. Also return, for each adaptive axis, how many
-    combinations of non-adaptive values miss the tolerance although none of their intervals may be halved again.
+    An interval is not halved if its width is `FINEST`, or if its combination of non-adaptive values already needs the
+    largest allowed number of values. `means` contains the means of each output that has a tolerance. Also return, for
+    each adaptive axis, how many combinations of non-adaptive values have such intervals, but none that may be halved.
     """
     found, short = mesh, {}
     for number in mesh.shares:
@@ -169,7 +172,10 @@ def refined(mesh: Mesh, means: Mapping[str, Means]) -> tuple[Mesh, dict[str, int
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve. The widest are first, so that one discontinuity does not use up all values."""
+    """Return the intervals to halve, so that no combination of non-adaptive values needs more than `at_most` values.
+
+    The widest intervals are first, so that one discontinuity does not use up all values.
+    """
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
     chosen = []
@@ -271,7 +277,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     count = max(len(groups) - 1, 1)
     around = missed[:, 1:] - missed[:, :1]
     scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; zero for one realisation
-    # this quantile limits the probability that scatter alone halves an interval to 1 - CONFIDENCE
+    # with this quantile, scatter alone exceeds the allowance in any of the lines with a probability of 1 - CONFIDENCE
     widely = ndtri(1 - (1 - CONFIDENCE) / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])

@@ -21,7 +21,11 @@ FEWEST = 12
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round, from the present `count` and from `growth_needed`."""
+    """Return the number of realisations after the next round; the present `count` if no case needs more.
+
+    `growth` contains the factors from `growth_needed`. The number is multiplied by the median factor of the cases that
+    need more results, within `LEAST_GROWTH` and `MOST_GROWTH`. The result is at most ``replication.at_most``.
+    """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
         return count
@@ -38,10 +42,10 @@ def growth_needed(
     """Return, for each case, the factor by which the number of results must grow (at most 1 if the number is enough).
 
     `values` and `scatter` (the standard error estimated within each realisation) have the shape (..., realisations).
-    `until` limits the standard error of the mean of each output. A case has enough results if the standard error is
-    within the tolerance and one of three conditions is met: there are `FEWEST` results; the standard error that follows
-    from `scatter` is within the tolerance; or the standard error is a rounding error. The factor is 0 for a case
-    without a successful result.
+    `until` contains the tolerances of the standard errors of the means. A case has enough results if, for each output
+    in `until`, the standard error is within the tolerance and one of three conditions is met: there are `FEWEST`
+    results; the standard error that follows from `scatter` is within the tolerance; or the standard error is as small
+    as rounding errors. The factor is 0 for a case without a successful result, and infinite for a case with one.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -60,13 +64,19 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Map outputs in `until` to those of `outputs` that contain their standard errors within each realisation."""
+    """For each output in `until`, return the output with its standard errors within each realisation.
+
+    An output in `until` is left out if no output in `outputs` contains its standard errors.
+    """
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor by which the number of results must grow to reduce the error to the allowed error."""
+    """Return the factor by which the number of results must grow to reduce the error to the allowed error.
+
+    The factor is infinite if the error is NaN.
+    """
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
@@ -82,7 +92,10 @@ def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) ->
 def mean_and_error(
     values: NDArray[np.float64], valid: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return mean and standard error (NaN for fewer than two values) of the valid values along the last axis."""
+    """Return mean and standard error of the valid values along the last axis.
+
+    The mean of no value is NaN, and so is the standard error of fewer than two values.
+    """
     count = valid.sum(axis=-1)
     mean = np.where(valid, values, 0.0).sum(axis=-1) / np.maximum(count, 1)
     squares = np.where(valid, values - mean[..., None], 0.0) ** 2

@@ -40,7 +40,7 @@ class Fit:
     `compute` takes the series of a store, indexed by name. A series has the dimensions (axes..., realisation, ...), and
     all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 %
     intervals of the constants (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``.
-    The attrs contain the units. If `apart` is true, `compute` takes one series at a time.
+    The attrs of each variable contain its unit. If `apart` is true, `compute` takes one series at a time.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Fit:
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         """Fit a store, and return the results, indexed by the name of the series (``""`` for all series together).
 
-        FitError is raised only if no series can be fitted.
+        A series that cannot be fitted is left out. FitError is raised if no series can be fitted.
         """
         if not self.apart:
             return {"": self._result(groups)}
@@ -109,8 +109,9 @@ def _judged(result: xr.Dataset) -> xr.Dataset:
 class Fitted:
     """A law fitted to a stack of data (see `mdr_dask.bootstrap`).
 
-    `constants`, shape (rows, p), and `residuals` (data minus law), shape (rows, cases), are stacks. Constants that the
-    data do not determine are NaN. `count` is the number of realisations that were resampled.
+    `constants`, shape (rows, p), and `residuals` (data minus law), shape (rows, cases), are stacks. The stack of
+    constants may have more rows, for data that are shifted by the residuals. Constants that the data do not determine
+    are NaN. `count` is the number of realisations that were resampled.
     """
 
     constants: FloatArray
@@ -140,9 +141,9 @@ def fitted(
     """Fit a law to a stack of data, shape (rows, cases).
 
     `fit` returns the constants, shape (rows, p): exponents or logarithms of factors. `left` returns data minus law. If
-    scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the residuals.
-    These fits make the intervals wider. A constant becomes NaN if the derivatives of the law, at the fitted or at the
-    `stated` constants, show that it is `undetermined`.
+    scatter and errors do not explain the residuals, or if the scatter is unknown, the law is also fitted to data that
+    are shifted by the residuals. These fits make the intervals wider. A constant becomes NaN if the derivatives of the
+    law, at the fitted or at the `stated` constants, show that it is `undetermined`.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -222,9 +223,10 @@ def law_holds(
 
     `chance` is the probability that scatter and errors alone cause such deviations. `chance` is NaN if this probability
     is unknown, and None if scatter and errors cannot cause the deviations. `scatter` is the rms deviation that scatter
-    and errors alone exceed with a probability of 5 %. The verdict can be *yes* only if `scatter` is at most `WITHIN`,
-    and *approximately* only if `scatter` is at most `APPROXIMATE`. If `logarithmic` is true, the deviations are
-    differences of natural logarithms, and a large difference is described by a factor.
+    and errors alone exceed with a probability of 5 %. `scatter` is NaN for too few realisations, and infinite if an
+    error is infinite; the law is then *not tested*. The verdict can be *yes* only if `scatter` is at most `WITHIN`, and
+    *approximately* only if `scatter` is at most `APPROXIMATE`. If `logarithmic` is true, the deviations are differences
+    of natural logarithms, and a large difference is described by a factor.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

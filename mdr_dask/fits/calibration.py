@@ -43,8 +43,9 @@ from mdr_dask.physics.refine import CLOSE
 from mdr_dask.tables import decoded
 from mdr_dask.units import shown
 
-#: A calibration tries `DEVIATIONS` sizes of the measurement error. The smallest size is `LEAST` times the rms residual
-#: of the best prediction, because the scatter of the lines may cause most of the residual. Chosen by trial.
+#: If the table contains no measurement errors, or errors that do not explain the residuals, a calibration tries
+#: `DEVIATIONS` sizes of the measurement error. The smallest size is `LEAST` times the rms residual of the best
+#: prediction, because the scatter of the lines may cause most of the residual. Chosen by trial.
 LEAST, DEVIATIONS = 0.2, 14
 
 
@@ -140,12 +141,13 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     The prior of an unknown is uniform over the axis of the unknown. If the axis is spaced logarithmically, the prior is
     uniform over the logarithm of the unknown. The measured values are assumed to be normally distributed about the
     prediction. The covariance of the measured values has three parts: measurement errors; scatter of the rough lines,
-    common to all points; and errors of grid and interpolation. The error of grid and interpolation of a point is the
-    sum of two equal parts: one part is common to all points, and the other part is independent for each point.
+    most of which is common to all points; and errors of grid and interpolation. The error of grid and interpolation of
+    a point is the sum of two equal parts: one part is common to all points, and the other part is independent for each
+    point.
 
     If the table contains no measurement errors, the logarithm of the size of the measurement errors has a uniform
-    prior. The measurement errors are then assumed to be either equal for all points, or proportional to the predicted
-    values.
+    prior. The measurement errors are then assumed to be either equal for all points or, if all measured values are
+    positive, proportional to the predicted values.
     """
     if measured.errors is not None and not measured.errors.all():
         raise FitError(f"{measured.source}: {ZERO}")
@@ -210,7 +212,10 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
 
 
 def measured_of(dataset: xr.Dataset, wanted: Collection[str] = ()) -> Measured:
-    """Return the measured points stored with a study; if they have several outputs, use the one in `wanted`."""
+    """Return the measured points stored with a study; of several measured outputs, use the one in `wanted`.
+
+    Raise FitError if the study has no table of measurements.
+    """
     table = dataset.attrs.get("measured")
     if not table:
         raise FitError(

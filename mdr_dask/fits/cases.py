@@ -31,8 +31,8 @@ def each(
     """Divide the cases of a series into groups, fit a law to each group, and return the results as one Dataset.
 
     A group contains all cases along the dimensions that the function `inner` returns. There is one group for each
-    combination of values along the other dimensions. The first output must have no dimensions except the axes of the
-    study and ``realisation``.
+    combination of values along the other dimensions. A variable that `fit` does not return for a group is NaN or an
+    empty text there. The first output must have no dimensions except the axes of the study and ``realisation``.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -85,14 +85,14 @@ class Table(NamedTuple):
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
         """Return the logarithms of the means of the `used` cases, as a stack.
 
-        An infinite discretisation error counts as 100 % of the mean.
+        The logarithm is shifted by the relative discretisation error, and by 1 if this error is infinite.
         """
         means = bootstrap.means(self.values[used].T)
         relative = self.mean_error(used) / means[0]
         return bootstrap.with_errors(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
 
     def mean_error(self, used: Any = slice(None)) -> FloatArray:
-        """Return the discretisation errors of the means of the `used` cases; 0 where an error is unknown."""
+        """Return the discretisation errors of the means of the `used` cases; 0 if every error of a case is unknown."""
         known = ~np.isnan(self.error[used])
         total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
         mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
@@ -109,7 +109,10 @@ class Table(NamedTuple):
 
 
 def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str = "friction_coefficient") -> Table:
-    """Return the values of an output in all cases, divided by a scale such as the rms slope."""
+    """Return the values of an output in all cases, divided by a scale such as the rms slope, and further `columns`.
+
+    If the study contains no discretisation errors of the output, the errors are 0.
+    """
     values = data[output]
     error = companion(data, output)
     arrays = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
@@ -160,7 +163,8 @@ def nonlinear(
 
     The function `model` takes constants, shape (rows, p), and returns the logarithms of the values of the law, shape
     (rows, cases). The constants `stated` are exponents or logarithms of factors. The law is fitted to the first row of
-    `logs`. The constants of the other rows follow by linearisation.
+    `logs`. The constants of the other rows follow by linearisation. The second value returned contains the result
+    variables of the deviations and of both tests.
     """
 
     def misfit(constants: FloatArray) -> FloatArray:

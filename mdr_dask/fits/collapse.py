@@ -18,7 +18,7 @@ from mdr_dask.units import conversion
 
 DEGREES = range(1, 7)  # degrees of the polynomials that are fitted to each curve, in order to estimate the scatter
 HOLDS = {"yes", "approximately"}
-LOG = float(np.log(10.0))  # factor that converts decades into natural logarithms, which are small relative deviations
+LOG = float(np.log(10.0))  # decades times LOG are natural logarithms; if small, these are relative deviations
 
 
 def laws_of(
@@ -29,7 +29,8 @@ def laws_of(
     `result.groups` contains the temperature, or the other number, that distinguishes each curve from the others. If the
     groups are temperatures, the laws are Arrhenius' law and the WLF law of log10 a_T. If the groups are other positive
     numbers, such as velocities, the law is a power law. All laws are fitted relative to the middle group, so that the
-    fit does not depend on the reference.
+    fit does not depend on the reference. If no law can be fitted, there are no fitted laws, and a sentence may state
+    the reason.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]

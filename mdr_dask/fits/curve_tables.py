@@ -28,8 +28,9 @@ LEAST_JUMP = 3.0
 def read_table(path: str | Path) -> pd.DataFrame:
     """Read a table of numbers below a row of names.
 
-    ``attrs["units"]`` contains the units if the table has a row of units. The index contains the place of each row in
-    the file, as the beginning of a message.
+    Columns of words are left out. ``attrs["units"]`` contains the units if the table has a row of units. The index
+    contains the place of each row in the file, as the beginning of a message. Storage and loss modulus are added if
+    other columns determine them.
     """
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
@@ -136,7 +137,7 @@ FAMILIES = (
     ("frequency", ("compliance",), "temperature"),
     ("time", ("compliance",), "temperature"),
 )
-"""Each entry names an abscissa, ordinates and a group. The first entry whose columns are all in the table is used."""
+"""Each entry names an abscissa, ordinates and a group. `columns_to_use` chooses the first suitable entry."""
 
 
 def columns_to_use(
@@ -144,7 +145,8 @@ def columns_to_use(
 ) -> tuple[str, tuple[str, ...], str]:
     """Return the names of the columns with the abscissa, the ordinates and the group.
 
-    Columns that are not given are taken from the first of the `FAMILIES` whose columns are all in the table.
+    Columns that are not given are taken from the first of the `FAMILIES` for which two conditions are met: the table
+    has all columns, and both the abscissa and the group vary. Raise DataError if no entry meets them.
     """
     wished = None if ordinate is None else (ordinate,) if isinstance(ordinate, str) else tuple(ordinate)
     found = []
@@ -179,8 +181,8 @@ def columns_to_use(
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
     """Return which vertical factors suit these columns; columns are recognised by name or unit.
 
-    The kind is ``none`` unless two conditions are met: the abscissa is a time or a frequency, and the group is a
-    temperature.
+    The kind is ``none`` unless three conditions are met: the abscissa is a time or a frequency; the group is a
+    temperature; and the ordinates are all moduli, or all compliances.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:
@@ -238,9 +240,10 @@ def curves_of(
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
     """Return the index of the nominal value of each measured value; measured values scatter about nominal values.
 
-    The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
-    each distinct value is a group of its own. But values that are close to each other form one group, as rounded
-    readings of one nominal value, if they alternate and no abscissa occurs twice in a group.
+    The sorted values are divided at the wide gaps. If the gaps are nearly equal, each distinct value is a group of its
+    own. The same holds if values are repeated: each at least twice, or three times on average. But repeated values that
+    are close to each other form one group, as rounded readings of one nominal value, if they alternate and no abscissa
+    occurs twice in a group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

@@ -54,9 +54,9 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
-    The exponent of a number (W, U or G) is NaN if the number does not vary or is a product of powers of the other two
-    numbers. The intervals follow from the misfit, because computed film thicknesses have no scatter. ``law_holds`` is
-    about the formula of Pan and Hamrock.
+    The exponent of a number (W, U or G) is NaN if the data do not determine it, for example because the number does not
+    vary or is a product of powers of the other two numbers. The intervals follow from the misfit, because computed film
+    thicknesses have no scatter. ``law_holds`` is about the formula of Pan and Hamrock.
     """
     found: Variables = {}
     departures, of_stated = [], []

@@ -95,8 +95,9 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to the velocity; None if it never is.
 
-    Friction counts as proportional if mu / v at the next velocity differs by less than the fraction `WITHIN`. The index
-    may be above 0, because the time stepping of the original papers makes friction at very low velocities too large.
+    Friction counts as proportional if mu / v at the next velocity differs by less than the fraction `WITHIN`. A single
+    velocity is accepted without this test. The index may be above 0, because the time stepping of the original papers
+    makes friction at very low velocities too large.
     """
     if velocity.size == 1:
         return 0

@@ -21,7 +21,7 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return c and n of the profile c |x|^n by which the method of dimensionality reduction replaces the indenter."""
+    """Return c and k of the profile c |x|^k by which the method of dimensionality reduction replaces the indenter."""
     if "indenter_angle" in data.coords:
         return PowerLaw.of_body(1.0, 1.0).coefficient * np.tan(data["indenter_angle"]), 1.0
     if "indenter_radius" in data.coords:
@@ -35,7 +35,7 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 def _half_width(data: xr.Dataset) -> Any:
     """Return the half width a of the contact of a smooth indenter at rest, in m.
 
-    By section 3.3.2 of the thesis, F_N / (4 G) is 2 n c a^(n+1) / (n + 1).
+    By section 3.3.2 of the thesis, F_N / (4 G) is 2 k c a^(k+1) / (k + 1), with c and k of `_body`.
     """
     coefficient, exponent = _body(data)
     load = data["normal_force"] / (4 * data["shear_modulus"])
@@ -59,9 +59,9 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The rms slope of the indenter must be at most `SMALL` times that of the roughness, because the squares of both
-    slopes are added. The indenter must be pressed in by at least the rms height. The velocity must not exceed the
-    velocity at which friction is largest.
+    The law neglects the slope of the indenter. Its rms slope must therefore be at most `SMALL` times that of the
+    roughness. The indenter must be pressed in by at least the rms height. If the velocity is an axis, it must not
+    exceed the velocity at which friction is largest.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)

@@ -17,8 +17,9 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
     The mean over realisations is interpolated by monotone cubics (PCHIP) along one axis after the other. Each axis is
     linear or logarithmic, as `Scale.of` chooses, and needs at least `FEWEST` values. An axis of words receives no new
-    values. The error is the half width of the 95 % interval of the mean plus the error of interpolation. The error of
-    interpolation is estimated by leaving out every second value.
+    values. The error is the half width of the 95 % interval of the mean plus two errors of interpolation: that of the
+    cubics, estimated by leaving out every second value, and that of linear interpolation in the dense table. Raise
+    FitError if a case has no value.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -55,7 +56,8 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
     """Return the mean of an output over the realisations, and the half width of the 95 % interval of the mean.
 
-    Where the interval is unknown, the discretisation error replaces the half width.
+    Where the interval is unknown, the discretisation error replaces the half width; if this error is unknown too, the
+    half width is 0. Raise FitError if a case that is needed has no value.
     """
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])

@@ -64,7 +64,7 @@ def is_jump(data: xr.Dataset) -> bool:
 def each_jump(
     series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables], *outputs: str
 ) -> xr.Dataset:
-    """Check that a series has jumps of the velocity; then fit a law as `mdr_dask.fits.cases.each` does."""
+    """Check that a series has jumps of the velocity and two or more realisations; then fit a law as `each` does."""
     (data,) = series.values()
     if "realisation" in data.sizes and data.sizes["realisation"] < 2:
         raise FitError(f"expected at least two realisations, got {data.sizes['realisation']}")

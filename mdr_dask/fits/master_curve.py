@@ -41,7 +41,8 @@ def master_curve(
     ``vertical_factor`` to log10 of the ordinate. The suffix ``_error`` marks the half width of the 68 % interval. The
     suffixes ``_low`` and ``_high`` mark the ends of the 95 % interval. All factors are 0 at the reference. If the
     reference lies between two groups, the shift to the reference is interpolated: the deviations of the shift factors
-    from the best law are interpolated linearly, and added to the law.
+    from the best law are interpolated linearly, and added to the law. Without a law, the shift factors themselves are
+    interpolated.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)

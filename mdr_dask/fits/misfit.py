@@ -30,7 +30,7 @@ class Residuals(NamedTuple):
 
     @property
     def chance(self) -> float:
-        """Probability that errors alone cause residuals as large as these; NaN if the errors are unknown."""
+        """Probability that errors alone cause such large residuals; NaN for unknown errors or `freedom` below 1."""
         return float(chdtrc(self.freedom, self.chi_squared)) if self.freedom > 0 else np.nan
 
 
@@ -70,7 +70,7 @@ def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[flo
 
     For each condition, a parabola is fitted to the residuals against the rank of the condition's value.
     The smallest probability is multiplied by the number of conditions, because every condition is another chance to
-    find a trend. The result is NaN if every condition has fewer than four values.
+    find a trend. If no condition has four or more different values, NaN and an empty name are returned.
     """
     found = []
     for name, values in conditions.items():

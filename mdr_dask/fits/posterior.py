@@ -20,13 +20,13 @@ from mdr_dask.fits.base import APPROXIMATE
 from mdr_dask.fits.prediction import Predicted, Prediction
 from mdr_dask.physics.refine import CLOSE
 
-#: Number of cells before refinement, and smallest number of cells that a refinement divides. Chosen by trial: with
-#: fewer cells, a refinement may miss a narrow maximum.
+#: Approximate number of cells before refinement, and smallest number of cells that a refinement divides. Chosen by
+#: trial: with fewer cells, a refinement may miss a narrow maximum.
 CELLS = 512
 #: Largest number of cells after a refinement; limits the time.
 MOST = 160_000
-#: Cells are left out if ln(density) is below its maximum by more than this value. The total probability of these cells
-#: is below 1e-5.
+#: A refinement leaves out cells in which ln(density) is below its maximum by more than this value, but it keeps at
+#: least `CELLS` cells. The total probability of the cells left out is below 1e-5.
 REACH = 14.0
 #: Refinement ends when ln(density) varies within a divided cell by less than this value on average. The weights of the
 #: average are the probabilities of the cells. Chosen by trial.
@@ -67,7 +67,8 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
     """Return a function that takes points in the unit cube and returns logarithms of the likelihood of measured values.
 
     The points have the shape (sets, unknowns). The logarithms have the shape (sets, total number of sizes in `noises`).
-    All items of `noises` have the same prior probability. All sizes of one item have the same prior probability.
+    The logarithms include the prior probabilities: all items of `noises` have the same prior probability, and so have
+    all sizes of one item.
     """
 
     def of(places: FloatArray) -> FloatArray:

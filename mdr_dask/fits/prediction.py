@@ -73,7 +73,11 @@ class Prediction:
 
 
 def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
-    """Return the prediction of a study at the measured points, as a function of the unknowns."""
+    """Return the prediction of a study at the measured points, as a function of the unknowns.
+
+    Raise FitError if the study is no grid, has unsuitable axes, or lacks values that the prediction needs. Raise
+    DataError if a measured point lies outside the study.
+    """
     output = dataset[measured.output]
     if "case" in output.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")

@@ -54,8 +54,8 @@ FIELDS = {
 class Relaxation(NamedTuple):
     """One exponential fitted to a trace. A trace is the mean of mu - mu_2 over realisations as a function of time.
 
-    `rate` is the stack of the fitted rate, and `integral_rate` is the stack of the rate that follows from the integral
-    of the trace. `holds` is the verdict on the exponential.
+    `rate` is the stack of the fitted rate; it is NaN if the times of the trace do not resolve the rate. `integral_rate`
+    is the stack of the rate that follows from the integral of the trace. `holds` is the verdict on the exponential.
     """
 
     rate: FloatArray
@@ -125,7 +125,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
 
 
 def law_rate(case: xr.Dataset) -> float:
-    """Return the rate of a case by eq. 4.12."""
+    """Return the rate of a case by eq. 4.12; NaN if eq. 4.12 needs the Hurst exponent, and the surface has none."""
     number = _passing_number(case)
     if number < 1:
         return number
@@ -246,7 +246,8 @@ def _rate_power(data: xr.Dataset) -> Variables:
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
     """Return an array with one column for each case: the stack of the rate.
 
-    The end of a short stack is filled up with the first value of the stack.
+    The end of a short stack is filled up with the first value of the stack. A long stack is cut off after the number of
+    rows that a stack with discretisation errors can have.
     """
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]

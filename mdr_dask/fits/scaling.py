@@ -169,8 +169,9 @@ class Collapse(NamedTuple):
     """The shifts of several curves onto a common curve.
 
     `shifts` is a stack, shape (rows, 2, curves), of the shifts along ln(velocity) and ln(friction). `residuals` is the
-    stack of the distances of the points from the common curve. `vague` marks the curves whose shift the data do not
-    determine, such as straight curves.
+    stack of the distances of the points from the common curve. `constants` is the number of fitted constants: values of
+    the common curve, and shifts. `vague` marks the curves whose shift the data do not determine, such as straight
+    curves.
     """
 
     shifts: FloatArray

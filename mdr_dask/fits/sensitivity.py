@@ -1,7 +1,8 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
 The output is the mean over realisations. The variance of this mean is computed from products of outputs of two
-realisations, because products of outputs of the same realisation contain the variance of the scatter.
+realisations, because products of outputs of the same realisation contain the variance of the scatter. If the study has
+only one realisation, the variance includes this scatter.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of Saltelli's design, with 95 % intervals.
 
     First-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total indices Jansen (1999).
-    A base point (see `_is_saltelli`) with a failed case is left out of the indices that need this case.
+    A base point (see `_is_saltelli`) with a case without a value is left out of the indices that need this case. Raise
+    FitError if the study is no complete design, or if the output is the same in every case.
 
     The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
     wide, because points of a Sobol sequence fill space more evenly than random points.
@@ -102,7 +104,10 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the product of `left` and `right`, averaged over all pairs of different realisations."""
+    """Return for each point the product of `left` and `right`, averaged over all pairs of different realisations.
+
+    With a single realisation, return its products.
+    """
     count = len(left)
     if count == 1:
         return np.asarray(left[0] * right[0])

@@ -25,9 +25,10 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The maximum of a parabola near the largest friction, fitted to the data and to all resamples.
+    """The maximum of a parabola near the largest friction, fitted to every row of a stack.
 
-    `height` is the maximum, corrected for its bias. The interval of `height` is wider if the residuals are large.
+    `height` is the maximum, corrected for its bias. It has additional rows for the residuals, which make its interval
+    wider.
     `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum. `rise` is 0 unless
     the maximum is at an end of the fitted range.
     """

@@ -33,7 +33,10 @@ def available(model: str) -> dict[str, Plot]:
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return the figures of a model. A model without its own figures gets one figure for each output that varies."""
+    """Return the figures of a model, indexed by name.
+
+    A model without its own figures also gets one figure for each output that varies and has one value for each result.
+    """
     from mdr_dask.plots.view import figure_of, varied
 
     known = available(model)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure that has a name. The function `draw` receives the groups of a store, indexed by the name of the series.
+    """A figure that has a name. The function `draw` receives the series of a store, indexed by name.
 
     `models` are the names of the models that have this figure. If `models` is empty, all models have the figure.
     `summary` names the quantities on both axes. `fitted` is true if the figure shows a fit. A fit takes a long time in
@@ -38,7 +38,7 @@ class Plot:
     fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
-        """Return the figure as data, and count the results that failed or are missing."""
+        """Return the figure as data; it states how many results failed, did not converge or are missing."""
         with self.faults_named(), page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
             figure = self.draw({name: _squeezed(data) for name, data in groups.items()})
             fixed = [{str(name) for name in data.coords if data[name].ndim == 0} for data in groups.values()]

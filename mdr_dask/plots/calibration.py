@@ -145,7 +145,10 @@ def _residuals(found: fit.Calibration, x: Axis, curves: Mapping[str, Points], da
 
 
 def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.Quantity, is_free: bool) -> Panel:
-    """Return the panel with the density and the 68 % and 95 % intervals of an unknown or a product of unknowns."""
+    """Return the panel with the density and the 68 % and 95 % intervals of an unknown or a product of unknowns.
+
+    If the data do not determine the unknown (`is_free`), the panel shows no intervals.
+    """
     shown, weights = how.of(values), found.posterior.weights
     known = name in found.unknowns
     log = bool(np.all(shown > 0)) and (not known or found.prediction.scales[found.unknowns.index(name)].logarithmic)

@@ -132,10 +132,11 @@ class Panel:
 class Figure:
     """A figure as data.
 
-    With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form the next column. With ``stack = 1``, the
-    panels fill row after row. `fixed` is a text with the fixed parameters, and `bars` is a text that explains the error
-    bars and bands. `left_out` are texts about results that are not drawn. `notes` are texts for the caption and the
-    table. `ratio` is the height of a panel divided by its width. `share_y` gives all panels the same vertical axis.
+    `subject` is the first part of the title. With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form
+    the next column. With ``stack = 1``, the panels fill row after row. `fixed` is a text with the fixed parameters, and
+    `bars` is a text that explains the error bars and bands. `left_out` are texts about results that are not drawn.
+    `warnings` are texts about doubtful results. `notes` are texts for the caption and the table. `ratio` is the height
+    of a panel divided by its width. `share_y` gives all panels the same vertical axis.
     """
 
     panels: list[Panel]
@@ -158,7 +159,7 @@ class Figure:
         self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
 
     def judge(self, law_holds: str) -> None:
-        """Write on the figure whether a fitted law holds."""
+        """Add a sentence on whether a fitted law holds: to `bars` if the law holds, otherwise to `warnings`."""
         if law_holds.startswith("yes"):
             self.bars = f"{self.bars}; {law_holds}"
         else:
@@ -200,9 +201,7 @@ class Figure:
         return [*rest, *(f"warning: {warning}" for warning in self.warnings), *self.notes]
 
     def head(self, origin: Mapping[str, str]) -> list[str]:
-        """Return the comment lines above the table: `origin`, the lines of the caption, units, and labels of the
-        panels.
-        """
+        """Return the comment lines above the table: `origin`, the caption, units, and labels of the panels."""
         table = self.table()
         units = table.attrs["units"]
         varied = [name for name in table if name in units]
@@ -219,8 +218,10 @@ def _text(value: Any, unit: str) -> str:
 
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
-    """Return the data of a trace: the given arrays (``x``, ``y``, ``value``), with the parameters from `of`. A `Mean`
-    gives three arrays, such as ``y``, ``y_low`` and ``y_high``. Unknown limits are left out.
+    """Return the data of a trace: the given arrays (``x``, ``y``, ``value``), with the parameters from `of`.
+
+    A `Mean` gives three arrays, such as ``y``, ``y_low`` and ``y_high``. If all lower or all upper limits are unknown,
+    their array is left out.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -251,7 +252,8 @@ def _apart(name: Any) -> str:
 def edges(centres: FloatArray, log: bool) -> FloatArray:
     """Return the edges of cells around the values of an axis: halfway between neighbouring values.
 
-    If `log` is true, the edges are halfway between the logarithms of neighbouring values.
+    If `log` is true, the edges are halfway between the logarithms of neighbouring values. The value at an end of the
+    axis is in the middle of its cell. The width of the cell of a single value is the absolute value, or 1 for 0.
     """
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)

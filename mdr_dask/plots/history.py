@@ -35,7 +35,7 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     needed = {BEFORE, JUMP, FRICTION}
     found = {name: data for name, data in groups.items() if needed <= data.keys() and data[FRICTION].notnull().any()}
     if not found:
-        raise DataError(f"expected a series with finished results of {', '.join(sorted(needed))}")
+        raise DataError(f"expected a series with finished results of {', '.join(sorted(needed))}, got none")
     families = {name: curves.family(data, FRICTION, TIME) for name, data in found.items()}
     kept, left_out = curves.with_one_legend(families)
     rest, kept = kept[LISTED:], kept[:LISTED]
@@ -99,8 +99,9 @@ def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
 
 
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times divided by the relaxation time, velocities in m/s and normal forces in N. The times end at
-    `last`.
+    """Return times divided by the relaxation time, velocities in m/s and normal forces in N.
+
+    The times begin before the history, at -`LEAD` times `last`, and end at `last`.
     """
     unit = case.time_unit()
     (speed, force), parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)

@@ -67,8 +67,8 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     """Return the units in which figures show the quantities of some series.
 
     If all campaign files use the same unit for a quantity, figures show this unit. Otherwise temperatures are in
-    degrees Celsius, rotation speeds in rpm, angles in degrees, and other quantities in SI units, with a prefix that
-    brings the largest value between 1 and 1000.
+    degrees Celsius, rotation speeds in rpm, angles in degrees, and other quantities in SI units. A unit such as m
+    or Pa gets a prefix that brings the largest value between 1 and 1000.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -123,9 +123,7 @@ def quantity(name: str, values: xr.DataArray) -> Quantity:
 
 
 def meaning(values: xr.DataArray, name: str) -> str:
-    """Return the long name of an output. Symbols are mathtext, and explanations after ``;``, ``,`` or ``(`` are
-    removed.
-    """
+    """Return the long name of an output, with mathtext for symbols, without a remark after ``;``, ``,`` or ``(``."""
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
     for ascii_form, symbol in _MATHTEXT.items() if "$" not in words else ():
         words = re.sub(ascii_form, symbol, words)

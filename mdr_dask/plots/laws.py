@@ -55,7 +55,8 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
 def along(data: xr.Dataset, name: str) -> xr.Dataset:
     """Return the parameters of a curve at many values of `name`, so that a law becomes a smooth line.
 
-    If one of the outputs `NEEDED` varies along the curve, the data are returned unchanged.
+    The data are returned unchanged if the values of `name` are not numbers, or if one of the outputs `NEEDED` varies
+    along the curve.
     """
     values = data[name]
     numeric = values.ndim == 1 and values.dtype.kind in "fiu"

@@ -99,9 +99,7 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
 
 
 def _lines(curve: xr.Dataset, channel: str) -> list[Trace]:
-    """Return the traces of a merged curve: the band, the dashed curve, and the solid part measured in the reference
-    condition.
-    """
+    """Return the traces of a merged curve: the band, the dashed curve, and the solid part measured at the reference."""
     x, y = curve["curve_abscissa"].values, curve[f"curve_{channel}"].values
     error = 10 ** curve["curve_error" if channel == "ordinate" else "curve_companion_error"].values
     ends = curve["curve_abscissa"].attrs

@@ -29,7 +29,10 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: Any
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Return series that also hold the measurements in `file`, and figures that also draw the measured points."""
+    """Return the series with the measurements in `file`, and figures that also draw the measured points.
+
+    `file` is a path or a pandas DataFrame.
+    """
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
 

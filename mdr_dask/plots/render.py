@@ -119,9 +119,7 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Remove the label of a horizontal axis if the panel below has the same axis, and the label of a vertical axis if
-    the panel on the left has the same axis.
-    """
+    """Remove the label of an axis that the next panel has too: of x if it is below, of y if it is on the left."""
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -160,8 +158,9 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Set the ticks of a logarithmic axis. If the axis spans less than two decades, the numbers at the ticks are plain,
-    such as 1, 2, 5, 10, 20 and 50.
+    """Set the ticks of a logarithmic axis.
+
+    If the axis spans less than two decades, the numbers at the ticks are plain, such as 1, 2, 5, 10, 20 and 50.
     """
     from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter
 
@@ -251,7 +250,10 @@ def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
 
 
 def _title(figure: Drawn, description: Figure) -> float:
-    """Write the title and return its height in inches. If a size is requested, write only a title from the user."""
+    """Write the title and return its height in inches; without a title, return 0.
+
+    A title from the user replaces the description of the figure. If a size is requested, there is no description.
+    """
     asked = page.current()
     if asked.title is not None or asked.width is not None:
         lines = [asked.title] if asked.title else []
@@ -303,8 +305,10 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels and return the height of the legend in inches. If a size is requested, the
-    legend takes at most a third of the height, and the last entries are left out if necessary.
+    """Draw one legend below all panels and return the height of the legend in inches.
+
+    If all labels have the same text before the equals sign, this text becomes the title of the legend. If a size is
+    requested, the legend takes at most a third of the height, and the last entries are left out if necessary.
     """
     width, asked = figure.get_figwidth(), page.current()
     most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 3

@@ -65,15 +65,17 @@ class View:
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
     def is_log(self, which: str, values: Any, how: labels.Quantity) -> bool:
-        """Return whether an axis is logarithmic. If `log` is None, an axis in degC is linear."""
+        """Return whether an axis is logarithmic. If `log` is None, an axis in a unit such as degC is linear."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
         return not how.offset and is_geometric(values) if self.log is None else which in self.log and positive
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameter that has the most values among the parameters with which an output varies. If the output is
-    itself a curve, for example against time, return the coordinate of this curve instead.
+    """Return the parameter that has the most values among the parameters with which an output varies.
+
+    If the output is itself a curve, for example against time, return the coordinate of this curve instead. Return an
+    empty tuple if the output varies with no parameter, or only with those in `without`.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -208,9 +210,7 @@ def _subject(view: View, output: str, found: Mapping[str, xr.Dataset], more: int
 
 
 def _places(data: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the positions of the values of a parameter along an axis: numbers in the shown unit, or 0, 1, 2, ... for
-    words.
-    """
+    """Return the positions of values on an axis: numbers in the shown unit, or 0, 1, 2, ... for words."""
     values = data[name]
     shown = labels.converted(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
     return xr.DataArray(shown, dims=values.dims)
@@ -334,9 +334,7 @@ def _by_series(each: Mapping[str, T]) -> tuple[list[tuple[str, T]], list[str]]:
 
 
 def _panel(title: str, families: Sequence[curves.Family], view: View, output: str, x: Axis) -> Panel:
-    """Draw one panel: the curves of all series in the panel, laws for these curves, and marks for cases without a
-    value.
-    """
+    """Draw one panel: the curves of all its series, their laws, and marks for cases with failed or missing results."""
     panel = Panel(x, Axis(""), title=title, bar=families[0].bar)
     along, law_name = view.along[0], ""
     marked: dict[str, str] = {}
@@ -415,9 +413,7 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 
 
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw an output against two parameters. The cases of a grid are drawn as cells. The cases of a sampled study are
-    drawn as points.
-    """
+    """Draw an output against two parameters. Cases of a grid are drawn as cells, cases of a sampled study as points."""
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without 'by', because colours show the values")
     parts, left_out = _by_series(found)
