@@ -22,7 +22,10 @@ Draw = Callable[["Progress | None", float, float], None]
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that receives the progress of a run. The latest progress is shown at regular intervals."""
+    """Yield a function that receives the progress of a run. The latest progress is shown at regular intervals.
+
+    Nothing is shown if `quiet` is true, or if there is neither a notebook nor stderr.
+    """
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:
@@ -54,7 +57,7 @@ def at_work(what: str) -> Iterator[None]:
 
 @contextmanager
 def _beating(draw: Draw, pause: float) -> Iterator[Callable[[Progress], None]]:
-    """Draw the latest progress every `pause` seconds."""
+    """Yield a function that receives the progress, and call `draw` with the latest progress every `pause` seconds."""
     started, ended = time.monotonic(), threading.Event()
     latest: tuple[Progress | None, float] = None, started
 
@@ -117,9 +120,11 @@ def _write(line: str) -> None:
 
 
 def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
-    """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
+    """Return one line about the progress: percentage, elapsed time, remaining time and numbers of results.
 
-    The remaining time counts down until another block ends. A remaining time of zero is not shown.
+    Failed results count towards the percentage. `elapsed` and `unchanged` are the times in s since the start and since
+    the last change of the progress. The estimated remaining time is reduced by `unchanged`, and is left out when it
+    reaches zero. While code is compiled, the line says so instead.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

@@ -1,14 +1,18 @@
-"""The exceptions of mdr_dask, and hints for messages. Workers pickle exceptions: use positional arguments only."""
+"""The exceptions of mdr_dask, and hints for messages.
+
+Workers pickle exceptions, so exceptions take positional arguments only.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-#: `LOOK`: time in s between two checks of what other processes have done. `PAUSE`: time in s of waiting after which a
-#: message is printed, and after which an unanswered question counts as failed. Chosen by trial.
+#: `LOOK`: time in s between two checks of what other processes have done, and between two updates of a progress bar.
+#: `PAUSE`: time in s of waiting after which a message is printed, and after which a request to another process counts
+#: as failed. Both are chosen by trial.
 LOOK, PAUSE = 1.0, 5.0
-#: Largest number of values that a text lists one by one, and of series that a figure shows in panels. Chosen by trial.
+#: Largest number of values that a text lists one by one, and of panels or series in a figure. Chosen by trial.
 LISTED = 6
 
 
@@ -17,7 +21,7 @@ class MdrDaskError(Exception):
 
 
 class CampaignError(MdrDaskError):
-    """A campaign that cannot be run. The arguments of the exception are the messages about all problems."""
+    """A campaign that cannot be run. Each argument of the exception is one message."""
 
     def __str__(self) -> str:
         return "\n".join(str(problem) for problem in self.args)
@@ -40,7 +44,7 @@ class ClusterError(MdrDaskError):
 
 
 class MachineError(MdrDaskError):
-    """A fault of the machine, such as a full disk. No case has failed, so the run can continue on another machine."""
+    """A fault of the machine, such as a full disk. It does not count as a failed case: run the campaign again."""
 
 
 class DataError(MdrDaskError):
@@ -81,12 +85,15 @@ _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the most similar known word, or else a list of the known words if there are at most 12."""
+    """Return the hint of `similar`. If it is empty, list the known words, unless there are more than 12."""
     return similar(word, known) or (f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else "")
 
 
 def similar(word: Any, known: Sequence[str]) -> str:
-    """Return a hint with the most similar known word, such as `` (did you mean 'hurst'?)``, or an empty text."""
+    """Return a hint with one known word, such as `` (did you mean 'hurst'?)``, or an empty text.
+
+    The known word is similar to `word`, or `word` is a common name for it, such as ``mu`` for ``friction``.
+    """
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}
@@ -103,5 +110,8 @@ def similar(word: Any, known: Sequence[str]) -> str:
 
 
 def with_digits(number: float, digits: int) -> str:
-    """Return a number with `digits` digits. Only numbers below 1e-4 and numbers of at least 1e10 have an exponent."""
+    """Return a number rounded to `digits` significant digits, without trailing zeros.
+
+    The text has an exponent only if the absolute value is at least 1e10, or below 1e-4 but not zero.
+    """
     return f"{float(f'{number:.{digits}g}'):.10g}"

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from mdr_dask.physics.superposition.master_curve import Vertical
 
-#: A campaign: the keys of a campaign file, or its path.
+#: A campaign: the keys of a campaign file, the path of such a file, or a `Campaign` that has been read.
 Source = Mapping[str, Any] | str | Path | Campaign
 #: A study: the return value of `run` or `open_study`, or the path or URL of a store.
 Study = xr.Dataset | xr.DataTree | str | Path
@@ -47,8 +47,8 @@ Words = str | Sequence[str]
 def read(source: Source) -> Campaign:
     """Read a campaign from the path of a campaign file, or from a mapping with the keys of such a file.
 
-    Values may be numbers in SI units, strings with units, pint quantities, lists and numpy arrays. The key ``name`` is
-    optional.
+    Values of a mapping may be numbers in SI units, strings with units, pint quantities, lists and numpy arrays. Its key
+    ``name`` is optional. CampaignError is raised if the campaign has problems.
     """
     if isinstance(source, Campaign):
         return source
@@ -98,8 +98,9 @@ def run(
     source : mapping, str, Path or Campaign
         The campaign, in any form that `read` accepts.
     store : str or Path, optional
-        Path or URL of the store. The default is the store that the campaign names. If the campaign names no
-        store, results are stored in a temporary folder that is kept until the process ends.
+        Path or URL of the store. The default is the store that the campaign names, or ``results/<name>.zarr``. For a
+        mapping without the key ``store``, the default is a store in a temporary folder, which is deleted when the
+        process ends.
     progress : bool
         Whether to show the progress: as a bar in a notebook or on a terminal, otherwise as a line every few seconds.
     resources : Resources, optional
@@ -110,8 +111,8 @@ def run(
     Returns
     -------
     Dataset or DataTree
-        The study, as returned by `open_study`. Failed results, and questions about numbers without a unit, are shown as
-        warnings.
+        The study, as returned by `open_study`. Warnings are shown if results failed in this run, if numbers without a
+        unit are perhaps not in SI, and if columns of a table of cases are not used.
 
     Raises
     ------
@@ -143,9 +144,10 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     Returns
     -------
     Dataset or DataTree
-        The outputs, with units and errors, and ``status``. The axes and ``realisation`` are dimensions of these arrays.
-        A campaign with series gives a DataTree with a node for each series. An array is read when it is first used.
-        While results are missing, the attribute ``complete`` is False, and means are taken over the available results.
+        The outputs with their units, their errors as ``<output>_error``, and ``status``. The dimensions of these arrays
+        are the axes (or ``case``, if the cases form no grid) and ``realisation``. A campaign with series gives a
+        DataTree with a node for each series. An array is read when it is first used. While results are missing, the
+        attribute ``complete`` is False; functions such as `table` compute means over the available results.
 
     Raises
     ------
@@ -189,7 +191,8 @@ def aggregate(
     Returns
     -------
     Dataset
-        A variable ``<output>_<statistic>`` for every output and statistic, and the number of results in each state.
+        A variable ``<output>_<statistic>`` for every output and statistic, the requested columns, and the number of
+        results in each state as ``state_counts``. An output without errors has no ``grid_error``.
     """
     parts = (_several(select), where, _several(group_by), (), _several(columns), units or {})
     asked = Question(_several(outputs), *parts, _several(statistics))
@@ -212,7 +215,9 @@ def table(
 ) -> pd.DataFrame:
     """Return a study as a table, like ``mdr-dask show``.
 
-    Each row contains a case and the means of its outputs. With ``statistics=None``, each row is a single result.
+    By default, each row contains a case and the means of its outputs with their errors. With ``statistics=None``, each
+    row is a single result. `limit` is the largest number of rows, or 0 for all rows. The other arguments are the same
+    as in `aggregate`, and `sort` is the same as the option of the command.
 
     Returns
     -------
@@ -253,8 +258,10 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
 
     Raises
     ------
+    DataError
+        If the model has no law of this name, or if the table of measured points is wrong.
     FitError
-        If the study lacks a quantity that the law needs.
+        If the law cannot be fitted, for example because the study lacks a quantity that the law needs.
     """
     groups = _groups(study)
     if measured is not None:
@@ -306,7 +313,7 @@ def plot(
     Raises
     ------
     DataError, FitError
-        If the study lacks a quantity that the figure needs.
+        If there is no such figure or output, or if the study lacks a quantity that the figure needs.
     """
     groups = _groups(study)
     model = _model(groups)
@@ -373,7 +380,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """All dimensionless numbers of the cases whose formulas contain only quantities of the study."""
+        """The dimensionless numbers of all cases, as far as the study contains the quantities in their formulas."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})

@@ -19,8 +19,9 @@ from mdr_dask.units import seconds, shown
 class Summary(Estimate):
     """The size and the costs of a campaign. ``print`` shows the text of ``mdr-dask check``.
 
-    `lines` is the text about the axes of each series, the notes and the costs. `questions` ask about numbers without a
-    unit.
+    `lines` name the campaign and its model, the axes of each series, the defaults used, the notes and the costs.
+    `questions` are the remarks of the campaign: questions about numbers without a unit, and notes about unused columns
+    of a table of cases.
     """
 
     lines: tuple[str, ...] = ()
@@ -38,7 +39,7 @@ def summary(campaign: Campaign) -> Summary:
 
 
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
-    """Yield the axes of each series, and the notes and costs of the campaign, line by line."""
+    """Yield the axes of each series, and the defaults, notes and costs of the campaign, line by line."""
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)
         if series.name:
@@ -82,7 +83,12 @@ def _defaults(campaign: Campaign) -> list[str]:
 
 
 def axis_range(axis: Axis, unit: str, written: str = "") -> str:
-    """Return the values of an axis, or the range and number of the values: ``1 mN to 100 N, 20 values, geometric``."""
+    """Return the values of an axis as text.
+
+    If there are more than `LISTED` numbers, the text is their range: ``1 mN to 100 N, 20 values, geometric``. If there
+    are more than `LISTED` labels, the text contains the first ones. The text of an adaptive axis is its range and its
+    tolerances.
+    """
     count = len(axis.values)
     if axis.refinement is not None:
         low, high = (shown(value, unit, written=written) for value in (axis.values[0], axis.values[-1]))
@@ -121,7 +127,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield lines about a study: its number of results, its size and its computing time."""
+    """Yield lines about a study: its number of results, blocks and files, its size and its computing time."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
@@ -132,11 +138,11 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
         times = " to ".join(dict.fromkeys(seconds(max(count * costs.seconds, 1.0)) for count in (1, more)))
         yield f"about {times} on one core: an estimate from a count of operations, not a measurement on this machine"
     if more > 1:
-        yield "ranges: the first number is for the first round, the second one for all rounds"
+        yield "ranges: the first number is for the first round or stage, the second one is the upper limit"
 
 
 def human_bytes(size: float) -> str:
-    """Return a number of bytes with two or three digits and a unit: ``1.5 MB``."""
+    """Return a number of bytes as text, rounded to two or three digits, with a unit: ``1.5 MB``."""
     for unit in ("B", "kB", "MB", "GB", "TB"):
         if size < 999.5 or unit == "TB":
             break
@@ -161,7 +167,7 @@ def costs_row(costs: Estimate) -> dict[str, Any]:
 
 
 def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
-    """Return the axes of all series: name, unit, number of values, first value and last value."""
+    """Return a row for each axis of each series: names, unit, number of values, first value and last value."""
     return [
         {
             "series": series.name,
@@ -178,6 +184,6 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _counted(what: str, first: int, more: float) -> str:
-    """Return a number with a noun, such as ``2 cases``, or ``2 to 8 cases`` if there may be further rounds."""
+    """Return a number with a noun, such as ``2 cases``, or ``2 to 8 cases`` if it may grow by the factor `more` = 4."""
     last = round(first * more)
     return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"

@@ -18,13 +18,16 @@ from mdr_dask.models.data_file import DataFile
 #: the rounding errors of `Spread.at`.
 _DIGITS = sys.float_info.dig - 1
 #: Two values of an axis count as equal if they agree in this number of digits, so that a study can be continued on a
-#: machine that rounds the 14th digit otherwise.
+#: machine that rounds the 14th digit differently.
 SAME_DIGITS = 12
 
 
 @dataclass(frozen=True)
 class Spread:
-    """An interval of values, on a logarithmic scale if `geometric` is true and on a linear scale otherwise."""
+    """An interval of values, on a logarithmic scale if `geometric` is true and on a linear scale otherwise.
+
+    `low` may be larger than `high`. If `whole` is true, the values are rounded to whole numbers.
+    """
 
     low: float
     high: float
@@ -71,7 +74,7 @@ class Axis:
     values: tuple[Any, ...]
     # Names of the values in the store if the values are not numbers. None for numbers.
     labels: tuple[str, ...] | None
-    # SI unit, ``"1"`` for pure numbers. None if the values are names.
+    # SI unit, ``"1"`` for pure numbers. None if the values are not numbers.
     unit: str | None
     long_name: str
     # None if the axis is not adaptive.
@@ -102,7 +105,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted relative error and absolute error. One of the two limits may be exceeded, but not both."""
+    """The largest accepted relative error and the largest accepted absolute error.
+
+    An error is accepted if it is within at least one of these two limits.
+    """
 
     relative: float = 0.0
     absolute: float = 0.0
@@ -144,9 +150,9 @@ class Campaign:
     seed: int
     replication: Replication
     series: tuple[Series, ...]
-    # The outputs to compute and store, in the order in which the model declares them.
+    # The outputs to compute and store, in the order in which the model declares them, with their companions.
     outputs: tuple[str, ...]
-    # Relative error allowed for the outputs.
+    # Largest accepted discretisation error of every output, relative to its value. None if the file sets no accuracy.
     accuracy: float | None
     # Path (relative to the working directory) or URL of the store.
     store: str

@@ -74,7 +74,10 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Parse a YAML 1.2 text. `source` is the name of the text in messages, for example the name of a file."""
+    """Parse a YAML 1.2 text. `source` is the name of the text in messages, for example the name of a file.
+
+    Errors in the text are not raised, but added to `problems` of the returned document.
+    """
     document = Document(source, text)
     problems = document.problems
     if len(text) > LARGEST:
@@ -109,7 +112,7 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
-    """Return a hint that names the likely mistake at the position of a syntax error or in the lines just above."""
+    """Return a hint on the likely mistake at or just above the position of a syntax error, or an empty text."""
     if text[index : index + 1] == "\t":
         return " (indent with spaces, not with tabs)"
     end = text.find("\n", index)

@@ -116,7 +116,7 @@ def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
 
 
 def _scalar(parameters: type[BaseModel], name: str) -> str:
-    """Return a value of a field as text: the default, a usual value, or a value within the bounds."""
+    """Return a value of a field as text: the default, a usual value, or another value that the field may have."""
     info = parameters.model_fields[name]
     kinds = fields.members(info.annotation)
     unit = unit_of(parameters, name)
@@ -141,7 +141,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return 1, or a number within the bounds of a field if 1 is not within these bounds."""
+    """Return 1 if it lies between the bounds of a field. Otherwise return another number between the bounds."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

@@ -22,7 +22,7 @@ from mdr_dask.campaign.written import questions
 from mdr_dask.models.base import Model, Parameters, with_value
 from mdr_dask.units import to_si
 
-#: Largest number of adaptive axes. With three adaptive axes, a study would need as many cases as a full grid.
+#: Largest number of adaptive axes. With three adaptive axes, a study would need about as many cases as a full grid.
 MOST_ADAPTIVE = 2
 
 
@@ -149,7 +149,10 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the values of one axis, each checked with the first values of the other axes; None if one is wrong."""
+        """Return the values of one axis, or None if a value is wrong.
+
+        Values are checked together with the first values of the other axes.
+        """
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         # the problems of another axis are reported when the values of that axis are checked

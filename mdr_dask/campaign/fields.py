@@ -37,7 +37,7 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a single value of this field is a list, so that a list does not mean the values of an axis."""
+    """Return whether a single value of this field may be a list. Then a list without lists does not vary the field."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
@@ -61,7 +61,7 @@ def listed(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
-    """Return the parameter set that a mapping describes. Keys such as ``shape: cone`` identify the parameter set."""
+    """Return the parameter set that a mapping describes, found by keys such as ``shape: cone``, or None."""
     if not isinstance(value, dict):
         return None
     for kind in structures(info):
@@ -135,7 +135,7 @@ def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
 
 
 def plain(number: float) -> str:
-    """Return a number as text. Whole numbers are written in full, and other numbers with at most 12 digits."""
+    """Return a number as text. An int is written in full, and a float with at most 12 significant digits."""
     return str(number) if isinstance(number, int) else f"{number:.12g}"
 
 

@@ -57,15 +57,17 @@ def read_measured(
     dims: Mapping[str, Collection[str]] | None = None,
     wanted: Collection[str] = (),
 ) -> Measured:
-    """Read a table of measured points. `conditions` and `outputs` map names of possible columns to SI units, and `axes`
-    maps the names of the numerical axes of the study to their values. `dims` maps the name of each output of the model
-    to the names of the coordinates of the output, such as the radius of a profile. DataError is raised if a column has
+    """Read a table of measured points.
+
+    `conditions` and `outputs` map names of possible columns to SI units. `axes` maps the names of the numerical axes of
+    the study, and of the coordinates of outputs, to their values. `dims` maps the name of each output of the model to
+    the names of the coordinates of this output, such as the radius of a profile. DataError is raised if a column has
     the name of a coordinate that only other outputs have.
 
-    If the table contains several outputs, the output in `wanted` is read. A heading such as ``temperature`` may be
-    short for ``solid_temperature``, if every other name that ends in ``temperature`` has more words. An axis without a
-    column is an unknown parameter. DataError is raised if an unused column may contain an unknown parameter, because
-    the column may be misnamed.
+    If the table contains several outputs, the output in `wanted` is read. DataError is raised unless exactly one output
+    can be read, with at least two points. A heading such as ``temperature`` may be short for ``solid_temperature``, if
+    every other name that ends in ``temperature`` has more words. An axis without a column is an unknown parameter.
+    DataError is raised if an unused column may contain an unknown parameter, because the column may be misnamed.
     """
     sheet = read_sheet(text, source)
     units = {**outputs, **conditions}
@@ -149,10 +151,11 @@ def scatter(measured: Measured, known: Mapping[str, ArrayLike], units: Mapping[s
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
     """Return the headings of columns with errors of the output, the unit of the errors, and whether they are relative.
 
-    The last of `columns` is the output. If no heading states a unit, the unit of the output is returned. If a heading
-    states a unit, the returned unit is empty, because the values are converted with the unit of the heading. Errors in
-    percent are relative, unless the output is in percent as well. The heading ``std``, which names no quantity, belongs
-    to the nearest known column on its left.
+    The last of `columns` is the output. If no heading of errors states a unit, the unit in the heading of the output is
+    returned. If a heading of errors states a unit, the returned unit is empty, because the values are converted with
+    the unit of this heading. Errors in percent are relative, unless the output is in percent as well. The heading
+    ``std``, which names no quantity, belongs to the nearest known column on its left, or to the output if no known
+    column is on its left.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):

@@ -207,8 +207,8 @@ def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return the message about an unknown key.
 
-    The message contains the new name of a renamed key, or the place of a key that belongs into a mapping inside or
-    outside this one, or the most similar key.
+    If the key has been renamed, the message contains the new name. If the key belongs in a mapping inside or outside
+    this one, the message says where. In all other cases, the message suggests a similar key or lists the known keys.
     """
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
@@ -221,7 +221,7 @@ def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _further_out(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint if an unknown key belongs into one of the mappings around its own mapping."""
+    """Return a hint if an unknown key belongs in one of the mappings around its own mapping."""
     for depth in range(len(path) - 2, -1, -1):
         around = _structure_around((*path[:depth], path[-1]), kind, data)
         if around and path[-1] in around.model_fields:

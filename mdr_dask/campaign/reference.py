@@ -72,8 +72,9 @@ Each of the `series` replaces some of the `parameters`. A campaign without `seri
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
 All except `grid` have the single dimension `case`. A range from which points are drawn states no number of values:
-`{linear: [a, b]}` is uniform, `{geometric: [a, b]}` is uniform in the logarithm. Drawn points depend only on `seed`; a
-larger `sobol` keeps the points of a smaller one. The headings of a table are names of parameters, with units if needed:
+`{linear: [a, b]}` is uniform, `{geometric: [a, b]}` is uniform in the logarithm. The same `seed` draws the same points,
+and a larger `sobol` keeps the points of a smaller one. The headings of a table are names of parameters, with units if
+needed:
 `velocity [mm/s],indenter.angle [deg]`.
 """
 
@@ -124,7 +125,7 @@ def _model(model: Model[Any]) -> str:
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
     tables = [_table(rows) for rows in (parameter_rows(model), output_rows(model), number_rows(model)) if rows]
     together = [f"* {line}" for line in alternatives_of(model)]
-    together = ["Exactly one of these is required:", "", *together, ""] if together else []
+    together = ["Exactly one alternative of each line is required:", "", *together, ""] if together else []
     return "\n".join([f"## `{model.name}`", "", summary, "", *together, *tables])
 
 

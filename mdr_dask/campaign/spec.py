@@ -50,7 +50,8 @@ class RefinedSpec(Parameters):
 
     adaptive: list[Any] = Field(description="first and last value of the axis")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(
-        description="largest accepted interpolation error: 1 % allows 1 % of the largest value of the first output; "
+        description="largest accepted interpolation error: 1 % allows 1 % of the largest value of the first "
+        "output with a single number for each case; "
         "{friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}} sets the error of each named output"
     )
     at_most: Whole = Field(

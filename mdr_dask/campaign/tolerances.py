@@ -56,7 +56,7 @@ def tolerance(given: Written, unit: str) -> Tolerance:
 def refinement(
     document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str]
 ) -> Refinement | None:
-    """Return the refinement of the adaptive axis at a path of a document, or None if there is a problem."""
+    """Return the refinement of the adaptive axis at a path, or None if it cannot be read. Report all problems."""
     data = value_at(document.data, path)
 
     def report(inner: Path, what: str, key: bool = False) -> None:

@@ -51,7 +51,8 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which values are drawn.
 
-    Only an adaptive axis has both values and an interval. `written` is the path of an adaptive axis in the document.
+    An adaptive axis, and a parameter whose values have been drawn, have both values and an interval. `written` is the
+    path of an adaptive axis in the document.
     """
 
     path: tuple[str, ...]

@@ -24,7 +24,7 @@ def written_units(text: str) -> dict[str, str]:
 
 
 def units_in(data: Mapping[str, Any]) -> dict[str, str]:
-    """Return the unit of each parameter whose values have the same unit everywhere in the campaign.
+    """Return the unit of each parameter whose values with a unit all have the same unit.
 
     The keys are names of coordinates, such as ``indenter_radius``.
     """

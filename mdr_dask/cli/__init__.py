@@ -69,10 +69,10 @@ def cli() -> None:
     mdr-dask run mine.yaml                         compute all results that are missing
     mdr-dask show results/sliding_friction.zarr    print results as a table, also during a run
     mdr-dask plot results/sliding_friction.zarr    draw figures
-    mdr-dask report results/sliding_friction.zarr  write all results to one page
+    mdr-dask report results/sliding_friction.zarr  write one page about the study
 
-    Exit codes: 0 all results are computed, 1 some cases failed, 2 wrong input, 3 a fault of the program,
-    130 interrupted. An environment variable can set an option: MDR_DASK_RUN_THREADS=4 means `run --threads 4`.
+    Exit codes: 0 success, 1 failed cases or a damaged store, 2 wrong input or a refused command, 3 a fault of the
+    program, 130 interrupted. An environment variable can set an option: MDR_DASK_RUN_THREADS=4 means `run --threads 4`.
     """
 
 

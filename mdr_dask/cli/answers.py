@@ -98,7 +98,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors, as in ``0.1234 +- 0.0005``, and also return a text that names the printed errors.
 
-    Errors that are unknown or zero in all rows are left out.
+    The errors of an output are left out if they are unknown, zero or rounding errors in all rows.
     """
     joined: dict[str, list[Any]] = {}
     left_out: set[str] = set()

@@ -51,7 +51,7 @@ def models(name: str | None, form: str | None) -> None:
     print_named([(_indented(row["parameter"]), _parameter(row)) for row in parameters])
     if together:
         lines = (click.wrap_text(line, terminal_width(), subsequent_indent="    ") for line in together)
-        click.echo("\n".join(["", "exactly one of these is required", *lines]))
+        click.echo("\n".join(["", "exactly one alternative of each line is required", *lines]))
     click.echo("\noutputs")
     print_named([(row["output"], _output(row)) for row in outputs])
     if numbers:

@@ -65,7 +65,7 @@ def fit(
     limit: int,
     form: str | None,
 ) -> None:
-    """Fit laws, and print their constants with 95 % intervals and whether they hold. Without a name, list the laws.
+    """Fit laws: print constants with 95 % intervals, and whether each law holds. Without a name, list the laws.
 
     `calibration` finds unknown parameters of a study from a table of measured points.
 

@@ -40,13 +40,13 @@ PARTS = ("factors", "curve", "points")
 @click.option(
     "--vertical",
     type=click.Choice(["none", "modulus", "compliance", "free"]),
-    help="Vertical factors of the curves. modulus or compliance: the known factor b_T and an unknown offset of some "
+    help="Vertical factors of the curves. modulus or compliance: the known factor b_T and an unknown offset of a few "
     "per cent (the default for these quantities); free: unknown factors; none: no factors.",
 )
 @click.option(
     "--reference",
     type=float,
-    help="Value of --by at which the factors are zero, in the unit of --by. It may lie between the measured values.",
+    help="Value of --by at which log10 of the factors is 0, in the unit of --by. It may lie between measured values.",
 )
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path), help="Write the table that --show selects to FILE.csv."

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 GAP = "  "
-#: Least width of a text that is wrapped, in characters. Chosen by trial.
+#: Least width, in characters, of a terminal and of a wrapped text in a table. Chosen by trial.
 NARROWEST = 25
 UNKNOWN = "-"
 #: A space at which lines are not broken.
@@ -31,12 +31,18 @@ _BLANK = "\N{NO-BREAK SPACE}"
 
 
 def terminal_width() -> int:
-    """Return the width of the terminal in characters, or 80 if the output is not a terminal."""
+    """Return the width of the terminal in characters, or `NARROWEST` if the terminal is narrower.
+
+    The variable COLUMNS overrides the width of the terminal. If neither is known, the width is 80.
+    """
     return max(NARROWEST, shutil.get_terminal_size((80, 24)).columns)
 
 
 def say(text: str, err: bool = False) -> None:
-    """Print a text with control characters escaped. On a terminal, long lines are wrapped between words."""
+    """Print a text with control characters escaped.
+
+    Long lines are wrapped between words on a terminal, or if the variable COLUMNS is set.
+    """
     stream = sys.stderr if err else sys.stdout
     lines = printable(text).split("\n")
     if stream is not None and (stream.isatty() or "COLUMNS" in os.environ):
@@ -51,7 +57,10 @@ def _filled(line: str) -> str:
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
-    """Print rows, all with the same keys: as an aligned ``table``, as ``csv``, or as a ``json`` document with units."""
+    """Print rows, all with the same keys: as an aligned ``table``, as ``csv``, or as a ``json`` document with units.
+
+    `limit` is the largest number of rows of an aligned table, or 0 or None for all rows.
+    """
     if form == "json":
         print_json({"units": units, "rows": [{key: finite(value) for key, value in row.items()} for row in rows]})
         return
@@ -78,7 +87,7 @@ def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys:
     """Print columns side by side. A table that is too wide is printed in parts or, if it has one row, as a list.
 
     Each part begins with the first `keys` columns. Columns with the same value in all rows, and columns without values,
-    are named in a line that begins with `note`.
+    are named above the table, in a line that begins with `note`.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[cell(value) for value in column] for column in columns]
@@ -190,7 +199,7 @@ def print_left(count: int | None) -> None:
 
 
 def printable(text: str) -> str:
-    """Return a text with control characters escaped, so that data cannot control the terminal."""
+    """Escape the control characters of a text, except line breaks, so that data cannot control the terminal."""
     return "".join(mark if mark.isprintable() or mark == "\n" else repr(mark)[1:-1] for mark in text)
 
 
@@ -225,7 +234,7 @@ def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], d
 
 
 def with_interval(value: float, low: float = math.nan, high: float = math.nan) -> str:
-    """Return a constant as text, followed by the ends of its interval if both ends are known."""
+    """Return a constant as text, or ``not determined`` for NaN. Known ends of its interval follow in brackets."""
     if math.isnan(value):
         return "not determined"
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -234,7 +243,10 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors. An unknown error becomes ``?``, and a rounding error becomes 0."""
+    """Join a mean and its errors. An unknown error becomes ``?``, and a rounding error becomes 0.
+
+    If the mean is not finite, or all errors are unknown, the text contains only the mean.
+    """
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return cell(mean)
     known = [error if error is not None and math.isfinite(error) else None for error in errors]

@@ -131,9 +131,9 @@ def show(
 ) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
-    A mean is followed by the standard error of the realisations and the discretisation error. The column `status` is
-    done, or states how many realisations are missing, failed or not_converged. A column with the same value in all rows
-    is printed above the table.
+    A mean is followed by its standard error over the realisations and by its discretisation error. The column `status`
+    is done, or states how many realisations are missing, failed or not_converged. A column with the same value in all
+    rows is printed above the table.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
@@ -204,7 +204,7 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
 
 
 def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
-    """Raise UsageError for an unknown name, with the nearest known name."""
+    """Raise UsageError for an unknown name, with a similar known name or a list of the known names."""
     from mdr_dask.errors import similar
 
     for name in names:

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 @click.option("--threads", type=click.IntRange(min=1), help="Number of threads (default: one per core).")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes on this machine, instead of threads.")
 @click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
-@click.option("--cluster", type=CAMPAIGN, help="YAML file with class, arguments and scale of any Dask cluster.")
+@click.option(
+    "--cluster", type=CAMPAIGN, help="YAML file of the Dask cluster to start: class, arguments, scale or adapt."
+)
 @click.option(
     "--patience",
     type=click.IntRange(1),

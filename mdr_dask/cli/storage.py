@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 @limit_option
 @json_option
 def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
-    """Read every file of a store, and list damaged, missing and foreign files; exit code 1 if there are any.
+    """Read every file of a store, and list damaged, missing and foreign files.
+
+    The exit code is 1 if there are such files or, with --repair, if some of them are left as they are.
 
     \b
     mdr-dask verify results/quickstart.zarr

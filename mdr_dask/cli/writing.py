@@ -18,7 +18,10 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a new file. If writing fails, remove file and folder, and name the file in the error."""
+    """Make the folder of a file to write.
+
+    If writing fails, remove the file and the folders that did not exist before, and name the file in the error.
+    """
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]

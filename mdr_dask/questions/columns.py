@@ -36,7 +36,7 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the fixed parameters whose value is a word, with ``_`` for dots in their names."""
+    """Return the fixed parameters whose value is a word or a truth value, with ``_`` for dots in their names."""
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")

@@ -52,8 +52,9 @@ Find = Callable[[str], xr.DataArray | None]
 class Value(NamedTuple):
     """The value of an expression: numbers in SI, words, or truth values.
 
-    `dimension` is the physical dimension of the numbers in pint, such as length, or None for words, truth values and
-    numbers without a unit. A number without a unit is in SI if it is compared with a quantity or added to a quantity.
+    `dimension` is the physical dimension of the numbers in pint, such as length. It is None for words, truth values,
+    numbers that are typed without a unit, and columns whose unit is unknown to pint. Numbers without a dimension are in
+    SI if they are compared with a quantity or added to a quantity.
     """
 
     array: Any
@@ -92,7 +93,9 @@ def parse(text: str) -> Expression:
 
 
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
-    """Return the value of an expression. Raise DataError for an unknown name or for quantities that do not match.
+    """Return the value of an expression.
+
+    DataError is raised for unknown names, for operations that are not allowed, and for quantities of different kinds.
 
     `find` returns a column with its unit in ``attrs["units"]``, or None if there is no column of this name.
     """
@@ -120,7 +123,7 @@ def _without_units(text: str) -> tuple[str, dict[str, Value]]:
 
 
 def _unit_at(text: str, start: int) -> str:
-    """Return the longest unit that begins at the position `start` of a text."""
+    """Return the longest unit that begins at the position `start` of a text, or an empty text if there is none."""
     longest, end = start, start
     while piece := _PIECE.match(text, end):
         if piece[1] in _KEYWORDS or (end == start and not re.match(r"[^\W\d]|[%°]", piece[1])):

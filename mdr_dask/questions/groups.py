@@ -24,10 +24,12 @@ CASES = "cases"
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
     """Average every output over the cases of each group, separately for each realisation.
 
-    A group has C cases. Case c has n_c results x_cr, and m_c is the mean of these results. All cases use the same R
-    realisations, so the results of the cases are correlated. Therefore the result of the group in realisation r is
-    ``m + R u_r``. Here, m is the mean of all m_c, and u_r is the sum of ``(x_cr - m_c) / (n_c C)`` over c. The mean and
-    the standard error of the R results of a group are correct even if n_c is not the same for all cases.
+    Let C be the number of cases of a group that have results. Case c has n_c results x_cr, and m_c is the mean of these
+    results. All cases use the same realisations, so the results of the cases are correlated. Therefore the result of
+    the group in realisation r is ``m + R u_r``. Here, R is the number of realisations in which the group has results, m
+    is the mean of all m_c, and u_r is the sum of ``(x_cr - m_c) / (n_c C)`` over c. The mean and the standard error of
+    the R results of a group are correct even if n_c is not the same for all cases. Errors of outputs are replaced by
+    their mean absolute value.
 
     `by` contains names of axes, or of columns of a sampled study. If `kept` is given, only cases where `kept` is true
     are included. The result has the dimension ``group`` instead of the axes.

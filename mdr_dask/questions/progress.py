@@ -57,7 +57,8 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
     """Group messages that differ only in their numbers. Each warning of a result is a separate message.
 
-    Quantities are converted to the units of the campaign file, whose text is an attribute of each dataset.
+    Quantities are converted to the units of the campaign file, as far as `_units` finds these units. The text of the
+    campaign file is an attribute of each dataset in `studies`.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -94,7 +95,11 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Map each SI unit to the unit used instead in the campaign file, if there is only one; by default K to degC."""
+    """Map SI units to the units that the campaign file uses instead.
+
+    An SI unit is left out if the campaign file uses several units instead of it. K is mapped to degC if the campaign
+    file contains no temperature with a unit.
+    """
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():
@@ -104,7 +109,7 @@ def _units(study: xr.Dataset) -> dict[str, str]:
 
 
 def _converted(text: str, units: Mapping[str, str]) -> str:
-    """Return a message in which all quantities are converted to the units of a campaign file."""
+    """Return a message in which every quantity with a unit in `units` is converted to the unit assigned to it."""
 
     def convert(found: re.Match[str]) -> str:
         first, rest, unit = found.groups()

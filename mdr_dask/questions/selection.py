@@ -30,8 +30,9 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 
     A selection is a name, ``=``, and values or ranges that are separated by commas, as in ``velocity=1 mm/s..1 m/s``,
     ``hurst=0.3,0.7`` or ``radius=..2``. The name is ``case``, ``realisation``, or the name of an axis, of a column of a
-    sampled study or of a fixed parameter. Both ends of a range are included. If a number is not a value of the axis,
-    the nearest value is selected, and `tell` receives a message.
+    sampled study or of a fixed parameter. Both ends of a range are included. If a number between two values of the axis
+    is selected, the nearest value is kept, and `tell` receives a message. DataError is raised for an unknown name, and
+    for a value or a range that selects nothing.
     """
     units = written_units(str(dataset.attrs.get("campaign", "")))
     for text in selections:
@@ -46,7 +47,7 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply each selection to every series in which its parameter varies, or to the first series if there is none."""
+    """Apply each selection to all series in which its parameter varies, or to the first series if it varies in none."""
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -57,7 +58,10 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases whose means over realisations meet a condition. Mark all other cases as not needed."""
+    """Keep the cases whose means over realisations meet a condition.
+
+    In all other cases, outputs are set to NaN, and the status is set to not needed.
+    """
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -85,7 +89,11 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
-    """Keep the named outputs and their errors. Without names, keep all outputs with one number for each result."""
+    """Keep the named outputs and their errors. Without names, keep all outputs with one number for each result.
+
+    The variable ``status`` is not kept. `tell` receives a message about the outputs that are left out without being
+    asked for. DataError is raised for an unknown name.
+    """
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:
@@ -195,7 +203,10 @@ def _nearest(
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the two ends of every range in a selection. For a single value, the two ends are equal."""
+    """Yield the two ends of every range in a selection.
+
+    A missing end is infinite. For a single value, the two ends are equal.
+    """
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]

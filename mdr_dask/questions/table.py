@@ -37,9 +37,10 @@ ROWS = 2**16
 class Question:
     """A question about a group of a study. Without statistics, the table has one row for each result.
 
-    `where` is a condition on single results, or on means if there are statistics. With `group_by`, the table has one
-    row for each combination of values of the named axes. `sort` contains columns or formulas, with a leading ``-`` for
-    descending order. If `written` is true, axes and parameters are in the units of the campaign file.
+    `where` is a condition on the means of cases; in a table without statistics, it is a condition on single
+    results. With `group_by`, the table has one row for each combination of values of the named axes. `sort` contains
+    columns or formulas, with a leading ``-`` for descending order. If `written` is true, axes and parameters are in the
+    units of the campaign file, unless `units` contains other units.
     """
 
     outputs: tuple[str, ...] = ()
@@ -77,7 +78,7 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     """Answer a question about a group of a study. Raise DataError for unknown names.
 
     The rows of a data frame are computed when the caller reads this frame. `limit` is the number of rows that the
-    caller will read, or 0 for all rows.
+    caller will read, or 0 for all rows. The frames together may have more than `limit` rows.
     """
     maker = _Maker(dataset, question, tell)
     units, keys = maker.first_row()
@@ -94,7 +95,8 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
     """Answer a question with lazy arrays: statistics and ``state_counts``, or single results and their ``status``.
 
-    The values of cases that do not meet the condition are NaN.
+    The values of cases that do not meet the condition are NaN. With `group_by`, such cases are left out of the
+    averages.
     """
     if question.sort:
         raise DataError("expected a table (.csv or .json) with --sort, got labelled arrays")
@@ -140,7 +142,7 @@ class _Maker:
         self.sizes = {dim: self._data.sizes[dim] for dim in self._dims}
 
     def first_row(self) -> tuple[dict[str, str], int]:
-        """Compute one row, to raise errors in the question at once.
+        """Compute one row, so that errors in the question are raised at once.
 
         Return the units of the columns, and the number of columns that identify a row.
         """
@@ -151,7 +153,7 @@ class _Maker:
         return self._frame(rows)[1], keys
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
-        """Yield frames of about `most` rows, in the order of the axes."""
+        """Yield frames in the order of the axes. Each frame has about `most` rows or fewer."""
         for _, rows in self._boxes(self._data, most, whole):
             if rows.sizes["row"]:
                 yield self._frame(rows)[0]
@@ -260,7 +262,10 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes of at most `most` points, yielded in C order. Large boxes end where chunks end."""
+    """Divide a grid into boxes of at most `most` points, and yield them in C order.
+
+    If a box is longer than a chunk along the divided dimension, it ends where a chunk ends.
+    """
     dims, inner = list(sizes), 1
     cut = len(dims)
     while cut and inner * sizes[dims[cut - 1]] <= most:
