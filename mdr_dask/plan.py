@@ -225,10 +225,10 @@ class Estimate:
 def templates(
     campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
 ) -> tuple[Template, ...]:
-    """Return the template of every series. Raise CampaignError if a series has too many results or needs too much
-    memory.
+    """Return the template of every series.
 
-    `stored_chunks` contains the chunk lengths of the series that are already in the store.
+    `stored_chunks` contains the chunk lengths of the series that are already in the store. Raise CampaignError if the
+    masks of a series do not fit into the memory. Raise ModelError if the model gives no coordinates for a dimension.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -285,7 +285,7 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
 
     A block first gets all values of the axes along which cases share work. A block that is too large is halved along
     these axes. A block with few operations gets more realisations, then more values of other axes, and finally the
-    realisations of later rounds.
+    realisations of later rounds. Lengths in `blocks` of the campaign replace the computed lengths.
     """
     shared = (
         axis.dim for path in model.whole for axis in template.series.axes if f"{axis.path}.".startswith(f"{path}.")

@@ -38,7 +38,7 @@ class Work:
     # Masks with the shape of the block. `wanted`: results to compute. `spared`: results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
-    # Number of times that the computation of the block has been started, including this time.
+    # Number of this attempt to compute the block or a part of it, beginning with 1. Each attempt has its own record.
     attempt: int
     operations: float
 
@@ -124,7 +124,9 @@ LONGEST_MESSAGE = 1000
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
     """Call the model for a block. If the call raises an exception, call the model again for each result alone.
 
-    If the user wrote the model (`is_own`), every exception counts as a failed case, and the results are checked.
+    A single result for which the model raises an exception is marked as failed. For a fault of the machine,
+    MachineError is raised instead. If the user wrote the model (`is_own`), a fault of the machine also counts as a
+    failed result, and the results are checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
@@ -309,7 +311,10 @@ def kind() -> str:
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit the libraries for linear algebra to one thread, because results could depend on the number of threads."""
+    """Limit the libraries for linear algebra to one thread, because results could depend on the number of threads.
+
+    The limit holds from the call until the returned context ends, or for good if it is not used as a context.
+    """
     import scipy.linalg  # noqa: F401  (loads the BLAS library of SciPy, which must be loaded before it can be limited)
     from threadpoolctl import threadpool_limits
 

@@ -1,4 +1,4 @@
-"""Run a campaign: rounds, resumed runs, failures and progress. Only this package computes with Dask."""
+"""Run a campaign: rounds, resumed runs, failures and progress. Only this package imports `distributed`."""
 
 from mdr_dask.execute.events import Event, Progress, Tell
 from mdr_dask.execute.resources import Resources

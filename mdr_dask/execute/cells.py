@@ -53,7 +53,8 @@ def find_cells(
     """Compare a round with the ledger to find the results that the round still has to compute.
 
     `asked` marks the cases of the stage. `needed` marks the cases that need the realisations of the round. These
-    realisations are ``realisations[0]`` to ``realisations[1] - 1``. `own` marks the results that belong to this part of
+    realisations are ``realisations[0]`` to ``realisations[1] - 1``. The round also computes earlier realisations of the
+    needed cases that have the state "not needed" in the ledger. `own` marks the results that belong to this part of
     the campaign; None means all results.
     """
     status = store.ledger(url, template.series.name, template.shape)

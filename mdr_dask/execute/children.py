@@ -51,7 +51,10 @@ class Child:
     def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
         """Compute a block in the child process, with at most `limit` seconds for each result.
 
-        A case in plain Python raises TimeoutError at the limit. Other blocks are killed a little later.
+        At the limit, a case of a plain Python model raises TimeoutError and counts as failed. The child process is
+        killed if the whole block takes `PAUSE` seconds longer than the limits of all its results together. Return a
+        Crash if the child process was killed or has crashed. Raise MachineError if the server has ended. If the child
+        process raises an exception, the same exception is raised here.
         """
         try:
             self.pipe.send((work, limit))
@@ -100,8 +103,9 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
     """Compute a block that may crash its process.
 
-    If the process crashes, each half of the block is computed alone. If a half crashes the process, this half is halved
-    again, down to single results. A single result that crashes the process is marked as failed.
+    If the process crashes or is killed at the time limit, each half of the block is computed alone. A half for which
+    this happens again is halved again, down to single results. A single result that crashes the process or exceeds the
+    limit is marked as failed. Yield each computed part of the block with its outcome.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     while pieces:

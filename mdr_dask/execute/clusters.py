@@ -159,7 +159,10 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add arguments that protect a cluster from other users: TLS, and a web page that only this machine can open."""
+    """Add arguments that protect a cluster from other users: TLS, and a web page that only this machine can open.
+
+    Only clusters on this machine and clusters of batch jobs get these arguments.
+    """
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD

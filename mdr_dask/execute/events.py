@@ -34,7 +34,10 @@ def of_block(name: str, work: Work, **facts: Any) -> Event:
 
 
 def ended(work: Work, outcome: Outcome) -> Event:
-    """Return the event of a finished block. A block with at least one failed result counts as failed."""
+    """Return the event of a finished block.
+
+    A block with at least one result that failed or did not converge counts as failed.
+    """
     counts = {state.name.lower(): outcome.counts[state] for state in Status if outcome.counts[state]}
     failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
     seconds = outcome.compute_seconds + outcome.write_seconds

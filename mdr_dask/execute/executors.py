@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 class Executor(AbstractContextManager["Executor"]):
     """Compute blocks on the given resources.
 
-    The blocks of a plain Python model are computed in child processes, because only one thread of a process can run
-    Python at a time, and because a crash would end the run.
+    The blocks of a plain Python model are computed in child processes unless `Resources.threads` is given, because only
+    one thread of a process can run Python at a time, and because a crash would end the run.
     """
 
     def __init__(self, resources: Resources, model: str, tell: Tell) -> None:
@@ -46,7 +46,10 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.__exit__(*reason)
 
     def apart(self) -> None:
-        """Choose child processes for all blocks. Call this method if a case may have crashed the last run."""
+        """Choose child processes for all blocks, unless they are computed on a cluster or this system cannot fork.
+
+        Call this method if a case may have crashed the last run.
+        """
         if hasattr(os, "fork") and not self._resources.remote and not self._is_apart:
             self._is_apart = True
             sentence = "the last run was killed or crashed: blocks are computed in child processes, to find the cause"
@@ -60,7 +63,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._window = self._stack.enter_context(task_window(self._resources, self._tell))
 
     def __call__(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks, and call `settle` for each block when it ends."""
+        """Compute blocks, and call `settle` for each block, or for each part of a halved block, when it ends."""
         self.connect()
         if self._window is not None:
             self._window.run(works, settle)

@@ -11,10 +11,11 @@ from typing import Any
 class Resources:
     """The threads, processes or cluster that a run uses: by default, all cores of this machine.
 
-    Models in plain Python use processes instead of threads, unless `threads` is given. `scheduler` is the address of a
-    running Dask scheduler. `cluster` is a description from `mdr_dask.campaign.cluster.load_cluster`. `client` is a Dask
-    client, which the run does not close. A run on a cluster ends with an error after `patience` seconds without any
-    worker. If `case_timeout` is given, a case fails after this time in s, and blocks are computed in child processes.
+    `threads` is the number of threads, and `workers` the number of child processes. Models in plain Python use child
+    processes instead of threads, unless `threads` is given. `scheduler` is the address of a running Dask scheduler.
+    `cluster` is a description from `mdr_dask.campaign.cluster.load_cluster`. `client` is a Dask client, which the run
+    does not close. A run on a cluster ends with an error after `patience` seconds without any worker. If `case_timeout`
+    is given, a case fails after this time in s, and blocks are computed in child processes.
     """
 
     threads: int | None = None

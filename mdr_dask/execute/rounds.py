@@ -231,7 +231,10 @@ class _Run:
 
 
 def _growth(url: str, template: Template, cases: BoolArray, count: int) -> FloatArray:
-    """Return the factor by which the number of realisations of each case must grow; at most 1 if there are enough."""
+    """Return the factor by which the number of realisations of each case must grow; at most 1 if there are enough.
+
+    Cases that `cases` does not mark get 0.
+    """
     if not cases.any():
         return np.zeros(cases.shape)
     until, name = template.campaign.replication.until, template.series.name

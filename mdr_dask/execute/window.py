@@ -62,7 +62,10 @@ class TaskWindow:
         client.subscribe_topic("all", self._report_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process."""
+        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process.
+
+        If the worker dies again, the results of the block are marked as failed.
+        """
         remaining = iter(works)
         suspects: set[tuple[str, BlockIndex]] = set()
 

@@ -33,8 +33,8 @@ from mdr_dask.report.papers import SOURCES
 from mdr_dask.units import seconds, shown
 from mdr_dask.version import __version__
 
-#: Largest number of cases of one series that are drawn. The laws of a larger study are not fitted. Chosen by trial: a
-#: page takes minutes.
+#: Largest number of cases of one series that are drawn. The laws of a larger study are not fitted. Chosen by trial:
+#: with this number, a page already takes minutes.
 MOST_CASES = 4000
 #: Width of the figures: two columns of a journal, which fit on paper without scaling.
 SIZE = "170mm"

@@ -40,9 +40,10 @@ class Place:
     url: str
     series: str
     index: BlockIndex
-    # The part of the arrays that the block fills: one slice for each dimension, the last one for ``realisation``.
+    # The part of the ledger that the block fills: one slice for each dimension, the last one for ``realisation``.
     region: tuple[slice, ...]
-    # The digest of the layout when the run began (`layout_mark`). A worker that finds another layout raises an error.
+    # The digest of the layout when the run began (`layout_mark`). A worker that finds another layout raises
+    # StoreError.
     layout: str
     lock: Lock
 
@@ -57,7 +58,7 @@ def write_block(
     """Write a block: first the record, then one whole chunk of every output, and finally the chunk of the ledger.
 
     Each array in `values` has the dimensions of the region, then the further dimensions of its output. `values` is
-    empty if only the ledger changes.
+    empty if only the ledger changes. Raise StoreBusyError, and write nothing, if the run no longer holds its lock.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -111,7 +112,7 @@ def _opened(url: str, series: str, names: Iterable[str] = ()) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
-    """Return the arrays of a group. The arrays are cached until the layout changes."""
+    """Return the arrays of a group, cached for each layout. Raise StoreError if this machine finds another layout."""
     found, here = layout_mark(url), platform.node()
     if found != layout:
         what = f"{here} finds another store or another layout" if found else f"not seen from {here}"
@@ -121,7 +122,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return empty copies of the arrays of a group in memory, and the dict that receives the encoded chunks."""
+    """Return empty arrays in memory, like the arrays of a group, and the dict that receives the encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory, empty = zarr.storage.MemoryStore(encoded), {}
     for name, array in shown.items():

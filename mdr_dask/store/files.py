@@ -86,7 +86,7 @@ def absolute(url: str) -> str:
 
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
-    """Turn errors of the file system or the network into a StoreError with a message of one sentence."""
+    """Turn errors of the file system or the network into a StoreError with the store, the action and the cause."""
     try:
         yield
     except MdrDaskError:
@@ -241,7 +241,10 @@ def flush(path: Path) -> None:
 
 
 def create(url: str, name: str, content: bytes) -> bool:
-    """Write a new file and return True. If a file of this name exists, return False and leave the file unchanged."""
+    """Write a new file and return True. If a file of this name exists, return False and leave the file unchanged.
+
+    If `conditional` returns False, two processes that create the file at the same time may both get True.
+    """
     path = local(url)
     with guarded(url, f"writing {name}"):
         try:
@@ -258,7 +261,10 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic: always for local files, and on servers that create a file in one request."""
+    """Return False if `create` is not atomic, because fsspec first looks for the file and then writes it.
+
+    Return True for local files and for all other servers. Some of these servers may ignore the condition.
+    """
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -346,7 +352,10 @@ def with_digest(document: Mapping[str, Any]) -> bytes:
 
 
 def without_digest(line: bytes) -> dict[str, Any] | None:
-    """Return the document in a line of JSON without its digest, or None if it is damaged. The digest may be missing."""
+    """Return the document in a line of JSON without its digest, or None if it is damaged.
+
+    A document without a digest counts as undamaged.
+    """
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

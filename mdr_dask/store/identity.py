@@ -34,13 +34,18 @@ class Stored:
     campaign: Campaign
     # Chunk lengths of the stored groups, by the names of their series.
     chunks: Mapping[str, Mapping[str, int]]
+    # Largest number of realisations of a stored group.
     realisations: int
     # For each stored group and dimension, the positions of the values of the given campaign on the extended axis.
     places: Mapping[str, Mapping[str, IntArray]]
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
-    """Compare a campaign with the store to be resumed or extended; raise StoreError with a list of all differences."""
+    """Compare a campaign with the store to be resumed or extended, and return the campaign to lay out.
+
+    Raise StoreError if another version of the model made the store, or if the store cannot be extended to the campaign.
+    In the second case, the message lists all differences.
+    """
     attributes(url)  # raises StoreError if this is not a study
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
     held = {name: found for name, found in groups.items() if found is not None}
@@ -69,7 +74,10 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
 
 
 def _require_version(url: str, campaign: Campaign) -> None:
-    """Raise StoreError if another version of the model made the store: results of two versions must not be mixed."""
+    """Raise StoreError if another version of the model made the store: results of two versions must not be mixed.
+
+    If the version is the same but the file of a user's model has changed, log a warning.
+    """
     held, version = attributes(url), models.load(campaign.model).version
     if held["model"] == campaign.model and held["model_version"] != version:
         program = held.get("versions", {}).get("mdr_dask", "another version")
@@ -166,7 +174,10 @@ def block_digests(attributes: Mapping[str, Any]) -> Callable[[Sequence[Sequence[
 
 
 def of_other_campaign(record: Mapping[str, Any], digests: Callable[[Sequence[Sequence[int]]], str]) -> bool:
-    """Return whether the record of a block belongs to another campaign. Older records do not name their campaign."""
+    """Return whether the record of a block belongs to another campaign.
+
+    Return False for older records, which do not name their campaign.
+    """
     return "campaign" in record and record["campaign"] != digests(record["region"])
 
 
@@ -219,15 +230,15 @@ def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
 
 
 def _text(values: Iterable[Any]) -> str:
-    """Return values of axes as text. Numbers that differ only by rounding have the same text."""
+    """Return values of axes as text. Numbers outside lists and mappings are rounded to `SAME_DIGITS` digits."""
     return json.dumps([float(f"{x:.{SAME_DIGITS}g}") if isinstance(x, float) else x for x in values], sort_keys=True)
 
 
 def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], places: IntArray) -> Axis:
     """Return an axis with the stored values, and then the new values of the given axis.
 
-    `places` are the positions of the values of the given axis. Lists and mappings are taken from the given axis,
-    because their files may have been moved.
+    `places` are the positions of the values of the given axis on the returned axis. If a stored list or mapping is also
+    on the given axis, it is taken from there, because its files may have been moved.
     """
     values = [_restore(series, axis.path, plain) for plain in stored["values"]]
     labels = None if stored["labels"] is None else list(stored["labels"])

@@ -39,8 +39,8 @@ from mdr_dask.store.integrity import RECORD, LayoutRecord, read_record
 from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
-#: Number of values in a chunk of a coordinate. With this large number, nearly every axis has a single chunk.
-#: Chosen by trial; an axis can grow during reading, because all its chunks have the same length.
+#: Number of values in a chunk of a coordinate. With this large number, chosen by trial, nearly every axis
+#: has a single chunk. The number never changes. A program can therefore read an axis while a run extends it.
 _COORDINATE_CHUNK = 4096
 #: Packages whose versions are written to the store.
 PACKAGES = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")
@@ -51,7 +51,8 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     """Create the arrays of every template, or extend existing arrays. Readers see either the old or the new shape.
 
     Files are written in this order: the record of the layout with the digests of all other files; coordinates and
-    metadata of arrays; metadata of groups; finally ``zarr.json``.
+    metadata of arrays; metadata of groups; finally ``zarr.json``. In a new store, a ``zarr.json`` without arrays is
+    written before them (see `mdr_dask.store.study.only_claimed`).
     """
     held = document(url)
     if held is None:
@@ -175,7 +176,11 @@ class Finding:
 
 
 def layout_faults(url: str) -> Iterator[Finding]:
-    """Yield every file of the layout that is missing or has a digest that is not in the record of the layout."""
+    """Yield every file of the layout that is missing or has a digest that is not in the record of the layout.
+
+    If the record is damaged, or missing from a store of layout 2, only the record is yielded. Stores of layout 1 have
+    no record, and nothing is yielded. If a run was stopped while it wrote the layout, missing files are not yielded.
+    """
     record, content = read_record(url), read_bytes(url, "zarr.json")
     if record is None:
         is_damaged = read_bytes(url, RECORD) is not None
@@ -192,7 +197,10 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment that says how to open a study with series, which looks empty if it is opened as one dataset."""
+    """Return a comment that says how to open a study with series, which looks empty if it is opened as one dataset.
+
+    Without series, the returned dictionary is empty.
+    """
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: use open_datatree, or open_zarr with {groups}"

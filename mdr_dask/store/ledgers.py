@@ -51,7 +51,7 @@ class Blocks:
         return itertools.product(*map(range, self.grid))
 
     def chunk(self, array: str, block: BlockIndex) -> str:
-        """Return the name of a chunk."""
+        """Return the file name of the chunk of a block in an array."""
         return chunk_name(self.series, array, block, self.further[array])
 
     def has(self, block: BlockIndex) -> bool:
@@ -60,7 +60,11 @@ class Blocks:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
-    """Return the ledger of a group. If `shape` is given, the ledger is cut or padded with "missing" to this shape."""
+    """Return the ledger of a group. If `shape` is given, the ledger is cut or padded with "missing" to this shape.
+
+    If the group does not exist, return a ledger of the given `shape` in which all results are missing. Raise StoreError
+    if the group does not exist and no `shape` is given, or if the ledger is damaged.
+    """
     metadata = document(url, series)
     if metadata is None:
         if shape is None:
@@ -101,10 +105,10 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 
 
 def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> None:
-    """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
+    """Raise StoreError if a file of the layout is damaged or missing, or a chunk of a block with results is missing.
 
-    The values are not read. If `to_run` is true, missing files of the layout are no fault, because the run writes
-    missing files again, but results of another campaign are a fault.
+    The values are not read. A missing record of the layout is no fault. If `to_run` is true, other missing files of the
+    layout are no fault either, because the run writes them again, but results of another campaign are a fault.
     """
     if any(_faults(url, series, to_run)):  # check again: a run may have changed a file meanwhile
         first = next(_faults(url, series, to_run), None)

@@ -1,9 +1,9 @@
 """Locks: a store is used by one exclusive run, or by several parts of a campaign at the same time.
 
 If the file system has locks, the operating system releases the locks of a process when the process ends. On other file
-systems, and at URLs, a run creates a lock file, called a claim, which only one process can create. The run then writes
-a second file, the heartbeat, at regular intervals. A run also holds a lock named the gate while it searches for active
-runs or lays out the study.
+systems, and at URLs, a run creates a file in the store, called a claim, which only one process can create. The run then
+writes a second file, the heartbeat, at regular intervals. A run also holds a lock named the gate while it searches for
+active runs or lays out the study.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ except ImportError:  # runs then create claims instead of locks
 
 #: Time in s between two attempts to acquire a lock. Chosen by trial.
 POLL = 0.05
-#: Error numbers of a file system without locks, and error numbers of a read-only file system.
+#: `NO_LOCKS`: error numbers of a file system without locks. `READ_ONLY`: error numbers of files that this process may
+#: not write.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -64,12 +65,12 @@ class Lock:
 
     # Name of the lock. The exclusive lock has an empty name.
     name: str
-    # Unique identifier of the run, empty if the run can only read.
+    # Unique identifier, new each time the lock is acquired. It is empty if the run can only read.
     owner: str
     # Number of the claim. None for a lock of the operating system.
     claim: int | None = None
     # Whether an earlier run crashed or was killed while holding this lock. For the exclusive
-    # lock, also whether a run crashed or was killed while holding the lock of a part.
+    # lock, also whether a run crashed or was killed while holding the lock of a part. Always False for a claim.
     after_crash: bool = False
 
 
@@ -209,7 +210,8 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
     """Raise StoreBusyError if a run no longer holds the given lock, and StoreError if the store can only be read.
 
-    While the context lasts, no other run can take over a lock of the operating system. A claim is checked only once.
+    While the context lasts, no other run can take over a lock of the operating system. A claim is checked only when
+    the context begins.
     """
     if not lock.owner:
         raise StoreError(f"{url}: the study is not finished, and nothing can be written here (permission denied)")
@@ -245,7 +247,8 @@ def _lock_file(url: str, name: str = "") -> Path:
 def _locked(file: Path) -> int:
     """Lock a lock file and return the descriptor. If another process deletes the file, create the file again.
 
-    Another process may hold the lock for an instant, to check whether the lock is held.
+    If another process holds the lock, try again for `LOOK` seconds, because that process may hold the lock only for an
+    instant, to check whether it is free. Then raise BlockingIOError.
     """
     give_up = time.monotonic() + LOOK
     while True:
@@ -356,7 +359,10 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, name: str) -> None:
-    """Remove the runner files of a lock. Before this, wait until tasks that have locked these files finish writing."""
+    """Remove the runner files of a lock. Before this, wait until tasks that have locked these files finish writing.
+
+    Raise StoreBusyError if a task has not finished after 2 `BEAT`.
+    """
     give_up = time.monotonic() + 2 * BEAT
     for runner in _runners(url, name):
         with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
@@ -407,7 +413,10 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
 
 def _make_claim(url: str, name: str, owner: str) -> int:
-    """Make a claim and return its number. Raise StoreBusyError if the owner of the last claim is active."""
+    """Make a claim and return its number.
+
+    Raise StoreBusyError if the owner of the last claim is active, or if another run makes the new claim first.
+    """
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
         raise _busy(url, _holder(url, name))
@@ -439,7 +448,10 @@ def _is_alive(url: str, name: str, number: int) -> bool:
 
 
 def _read_claim(url: str, name: str) -> dict[str, Any]:
-    """Return the content of a lock file or heartbeat file. The content of a missing or incomplete file is empty."""
+    """Return the content of a claim or a heartbeat, or an empty dictionary if the file is missing.
+
+    An incomplete file counts as missing on a disk; at a URL it raises StoreError.
+    """
     try:
         return read_json(url, name) or {}
     except StoreError:

@@ -60,7 +60,10 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
 
 def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a copy for netCDF. Attributes that are neither texts nor numbers are JSON texts in the copy."""
+    """Return a copy for netCDF. Attributes that are neither texts nor numbers are JSON texts in the copy.
+
+    Attributes that are None, and the version of the layout, are left out.
+    """
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)

@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-A run writes one record file for each block. From time to time, the run merges many record files into one file, because
-a folder with a hundred thousand files would be slow.
+A run writes one record file for each attempt to compute a block. From time to time, the run merges many record files
+into one file, because a folder with a hundred thousand files would be slow.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _warn_of_damaged(url: str, count: int) -> None:
 
 
 def attempts(url: str, series: str) -> dict[BlockIndex, int]:
-    """Return the number of recorded attempts to compute each block."""
+    """Return the largest number of an attempt in the records of each block. Blocks without a record are left out."""
     found: dict[BlockIndex, int] = {}
     for record in records(url, series):
         key = tuple(record["block"])

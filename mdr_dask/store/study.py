@@ -33,8 +33,8 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     """Return the metadata of a group from ``zarr.json``, or None if the group does not exist.
 
-    The returned metadata are cached: do not change the metadata. Raise StoreError if this program did not write the
-    metadata.
+    The returned metadata are cached: do not change the metadata. Raise StoreError if the metadata are damaged,
+    or if it is not safe to open the arrays.
     """
     content = read_bytes(url, "zarr.json")
     if content is None:
@@ -47,7 +47,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
-    """Return the metadata of a study, or None if the metadata are unsafe or not in the record of the layout."""
+    """Return the metadata of a study, or None if they are no JSON, unsafe, or not in the record of the layout."""
     try:
         root = parsed(content)
     except ValueError:
@@ -124,7 +124,11 @@ def refuse_file(url: str, expected: str = "the folder of a store") -> None:
 
 
 def exists(url: str) -> bool:
-    """Return whether there is a study at a path or URL; raise StoreError for a file or a folder with other files."""
+    """Return whether there is a study at a path or URL; raise StoreError for a file or a folder with other files.
+
+    Return False if the first run was stopped before it laid out the study. Return True also for a Zarr store of another
+    program, for which `attributes` raises StoreError.
+    """
     refuse_file(url, "the folder of a store, or a path that does not exist")
     path, found = local(url), _root_attributes(url)
     if found is None and path is not None and path.is_dir():
@@ -153,7 +157,10 @@ def only_claimed(found: Mapping[str, Any]) -> bool:
 
 
 def attributes(url: str) -> dict[str, Any]:
-    """Return the attributes of a study; raise StoreError if there is no study, or if the layout has a later version."""
+    """Return the attributes of a study.
+
+    Raise StoreError if there is no study, if the layout has a later version, or if the study was never laid out.
+    """
     refuse_file(url)
     found = _root_attributes(url)
     if found is None:

@@ -80,8 +80,9 @@ def verify(url: str) -> Inspection:
 def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Damaged metadata are written again. Damaged coordinates, blocks and records are removed. The next run writes the
-    removed files again. Foreign files are removed only from the folders of chunks and records.
+    Damaged or missing metadata are written again. Damaged coordinates, blocks and records are removed; the next run
+    writes the coordinates and computes the blocks again. Foreign files are removed only from the folders of chunks and
+    records.
     """
     refuse_file(url)
     with exclusive(url):

@@ -101,7 +101,7 @@ def solve_jumps(
     errors = Levels(*refined.errors if accuracy is not None else np.full((4, cases), np.nan))
     shape = cases, march.times.size if march else 0
     trace, depth, trace_error, depth_error = (np.full(shape, np.nan) for _ in range(4))
-    contact = np.array([limits[grid, k].contact.max() for k in range(cases)])
+    contact = np.array([limits[grid, k].contact.max() if (grid, k) in limits else np.nan for k in range(cases)])
     jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, contact, refined.outcome)
     if march is None:
         return jumps
