@@ -46,7 +46,7 @@ wear volume, worn volume, V, verschleißvolumen
 cycles, number of cycles, N, zyklen, zyklenzahl
 """.splitlines()
 )  # fmt: skip
-#: Words that may stand before or after the name of a quantity without changing its meaning.
+#: Words in the name of a column that do not change its meaning.
 IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured", "linear"}
 #: Units that may be joined to a name, as in ``freq_hz``. The keys are in lower case.
 JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}
@@ -61,9 +61,9 @@ _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
 class Column:
     """A column that a table may contain under its `name`, a synonym in `SYNONYMS`, or one of `other_names`.
 
-    The SI `unit` is ``"1"`` for pure numbers. In SI, all values must be greater than `above` and at least `least`.
-    `given_unit` is used if the table states no unit. If `given_unit` is empty, the table must state the unit of this
-    column, unless the column contains pure numbers.
+    The SI `unit` is ``"1"`` for pure numbers. In SI, all values must be greater than `above` and at least `least`,
+    if these bounds are given. `given_unit` is used if the table states no unit. If `given_unit` is empty, the table
+    must state the unit of this column, unless the column contains pure numbers.
     """
 
     name: str
@@ -89,7 +89,7 @@ def plain(name: str) -> str:
 
 
 def _key(name: str) -> str:
-    """Return a name without blanks and without the words in `IGNORED`."""
+    """Return a name without blanks, and without the words in `IGNORED` unless all its words are in `IGNORED`."""
     words = plain(name).split()
     return "".join([word for word in words if word not in IGNORED] or words)
 
@@ -131,7 +131,7 @@ def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading such as ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
     Text in square brackets is always a unit. Elsewhere, a text is a unit only if it looks like one. In ``force (F)``, F
-    is the symbol of the force and not a unit.
+    is the symbol of the force and not a unit. If there is no unit, return the whole heading and an empty unit.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -193,8 +193,9 @@ def fits(unit: str, column: Column) -> bool:
 def factors(unit: str, wanted: str) -> tuple[float, float, float]:
     """Return the numbers p, q and z that convert a unit to SI: x in this unit is p (q x + z) in the SI unit `wanted`.
 
-    For an angular frequency, p is 2 pi if the unit is Hz or 1/min (revolutions per minute). Values in 1/s count as
-    values in rad/s. For all other quantities, p is 1.
+    For an angular frequency, p is 2 pi if the unit is Hz, kHz or 1/min (revolutions per minute). Values in 1/s count as
+    values in rad/s, and values in 1/m as values in rad/m. For all other units, p is 1. Raise ValueError if the unit is
+    unknown or has another dimension.
     """
     if not unit:
         return 1.0, 1.0, 0.0

@@ -169,7 +169,7 @@ def unit_behind(value: str) -> str:
 
 
 def spelt(value: str) -> str:
-    """Return a hint on how to write a decimal point, a list or a range, for a text that is not a number."""
+    """Return a hint on how to write a decimal point, a list or a range, or an empty text if none of them is meant."""
     if _THOUSANDS.fullmatch(value.strip()):
         return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
     if _COMMA.match(value):
@@ -245,7 +245,7 @@ def _decades(value: float, unit: str, usual: str) -> float:
 
 
 def example_unit(unit: str) -> str:
-    """Return the common unit of a quantity with the given SI unit, such as MPa for Pa."""
+    """Return a common unit of a quantity with the given SI unit, such as MPa for Pa."""
     return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
 
 
@@ -285,7 +285,10 @@ def registry() -> UnitRegistry[Any]:
 
 @lru_cache(maxsize=1024)
 def conversion(given: str, unit: str) -> tuple[float, float]:
-    """Return `factor` and `zero`, with which ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`."""
+    """Return `factor` and `zero`, with which ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`.
+
+    Raise ValueError if `given` is unknown or has another dimension than `unit`.
+    """
     from pint.errors import DimensionalityError, UndefinedUnitError
 
     units, wanted = registry(), "a pure number" if unit == "1" else expected(unit)
@@ -318,13 +321,16 @@ def converts(given: str, unit: str) -> bool:
     return bool(given)
 
 
-#: Coherent SI unit of each base dimension in `DEFINITIONS`.
+#: Coherent SI unit of each base dimension in `DEFINITIONS` except the amount of substance.
 _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
 
 
 @lru_cache(maxsize=1024)
 def dimension_of(unit: str) -> tuple[Any, str]:
-    """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension."""
+    """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension.
+
+    Raise ValueError if the unit is unknown. Units with an amount of substance, such as J/mol, are not supported.
+    """
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
     dimension = registry().parse_units(_factor_and_unit(unit)[1]).dimensionality
@@ -354,7 +360,11 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint with a similar unit in `COMMON`. If `unit` is given, the similar unit must have its dimension."""
+    """Return a hint with a unit in `COMMON` that is similar to `word`.
+
+    If `unit` is given, the similar unit must have its dimension. If no unit is similar, the hint names the quantity
+    that is measured in `unit`, or is empty if `unit` is not given.
+    """
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"

@@ -1,4 +1,4 @@
-"""Access to the models by name. A model is imported only when a campaign names it.
+"""Access to the models by name. A model is imported when `load` is first called with its name.
 
 Models come from this package, from the entry points of other packages, or from a module of the user.
 """
@@ -43,7 +43,8 @@ def names() -> tuple[str, ...]:
 def load(name: str) -> Model[Any]:
     """Return the model called `name`.
 
-    `name` is one of `names()`, or has the form ``package.module:NAME``. Raise ModelError if no model has this name.
+    `name` is one of `names()`, or has the form ``package.module:NAME``. Raise ModelError if no model has this name,
+    or if the model cannot be imported.
     """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
@@ -62,15 +63,16 @@ def is_own(name: str) -> bool:
 
 
 def source_digest(name: str) -> str | None:
-    """Return a digest of the source file of a user's model. Blank lines and comment lines do not change the digest.
+    """Return a digest of the source file of a model from outside this package.
 
-    Return None for a model of this package, or if the source file cannot be read.
+    The source file is the one that defines the function `compute`. Blank lines, comment lines and indentation do not
+    change the digest. Return None for a model of this package, or if the source file cannot be read.
     """
     return _digest(load(name).compute) if is_own(name) else None
 
 
 def require_current(name: str) -> None:
-    """Raise ModelError if the file of a user's model has changed since this Python process imported the model."""
+    """Raise ModelError if the digest of a model's source file has changed since this process imported the model."""
     if imported_digest(name) != source_digest(name):
         module = name.partition(":")[0]
         raise ModelError(
@@ -94,17 +96,20 @@ _digest_at_import = lru_cache(_digest)
 
 
 def imported_digest(name: str) -> str | None:
-    """Return the digest that the source file of a user's model had when this process imported the model."""
+    """Return the `source_digest` of a model at the time when this process imported the model."""
     return _digest_at_import(load(name).compute) if is_own(name) else None
 
 
 def registered_name(name: str) -> str:
-    """Return the name under which a package registers a model, or `name` itself if no package registers the model."""
+    """Return the name under which a package registers the model at ``package.module:NAME``.
+
+    Return `name` unchanged if no package registers it.
+    """
     return next((known for known, entry in _installed().items() if entry.value == name), name)
 
 
 def offered(entries: Iterable[EntryPoint]) -> Iterator[Any]:
-    """Yield the fits or figures that other packages offer. If a module cannot be imported, log a warning."""
+    """Yield the fits or figures that other packages offer. If an entry cannot be loaded, log a warning and skip it."""
     for entry in entries:
         try:
             yield from entry.load()
@@ -144,7 +149,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function that calls a function of a user's model and converts every exception to a ModelError."""
+    """Return a function that calls `function` of a model from outside this package. Exceptions become ModelErrors."""
 
     def call(argument: Any) -> Any:
         try:

@@ -62,7 +62,10 @@ class Parameters(BaseModel):
     requires: ClassVar[Mapping[str, tuple[str, str]]] = {}
 
     def require_one_alternative(self) -> None:
-        """Raise ValueError unless exactly one member of each group of alternatives is given."""
+        """Raise ValueError unless exactly one alternative of each group is given.
+
+        Names with dots, for nested parameters, are not supported here.
+        """
         for group in self.alternatives:
             given = {name for member in group for name in member if getattr(self, name) is not None}
             if not any(given == set(member) for member in group):
@@ -70,7 +73,7 @@ class Parameters(BaseModel):
 
     @property
     def inactive(self) -> dict[str, str]:
-        """The parameters that have no effect, each with the name of the parameter that overrides it."""
+        """The parameters that another parameter overrides, each with the name of the parameter that overrides it."""
         return {other: name for name, other in self.overrides.items() if getattr(self, name) not in (None, ())}
 
 
@@ -83,8 +86,8 @@ def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
-#: Smallest and largest allowed absolute value of a quantity in SI units; 0 is allowed, too. Products of ten such
-#: numbers neither overflow nor underflow.
+#: Smallest and largest allowed absolute value of a quantity in SI units. The value 0 is also allowed. For pure numbers,
+#: only the upper limit applies. A product of ten numbers between these limits neither overflows nor underflows.
 LEAST, MOST = 1e-30, 1e30
 
 
@@ -93,9 +96,9 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
 
     `unit` is the coherent SI unit, or ``"1"`` for a pure number. `usual` is a common value with its unit, such as
     ``"10 MPa"``. ``mdr-dask init`` writes this value into a new campaign file. Further values after commas, as in
-    ``"2 GPa, 200 HV"``, show other common units of the quantity. If a campaign gives a number without a unit, and one
-    of these units would bring the value closer to `usual`, ``check`` asks for the unit. The other arguments, such as
-    ``default``, ``gt`` and ``le``, are passed to :func:`pydantic.Field`.
+    ``"2 GPa, 200 HV"``, show other common units of the quantity. If a campaign gives a number without a unit, and the
+    number in one of these units would be closer to the first value than the number in SI, ``check`` asks for the unit.
+    The other arguments, such as ``default``, ``gt`` and ``le``, are passed to :func:`pydantic.Field`.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
@@ -108,13 +111,13 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = usual.split(", ") if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
-    if unit != "m^(1-n)":  # the coefficient c of a body c r^n has no limits, because c may have any size
+    if unit != "m^(1-n)":  # no limits for the coefficient c of a body c r^n, because its SI value depends strongly on n
         field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
 
 def _conceivable(least: float, value: Any) -> Any:
-    """Raise ValueError for a number so large or so small that products of such numbers overflow or underflow."""
+    """Return `value`, or raise ValueError if products of numbers of such a size could overflow or underflow."""
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
             raise ValueError(f"expected an absolute value between {least:g} and {MOST:g} in SI units, got {number:.9g}")
@@ -139,13 +142,13 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
     return notes
 
 
-#: Dimensionless numbers are rounded to this number of bits; a double has 53 bits. Numbers with a relative difference of
-#: less than about 6e-14 become equal in most cases and then share one solution.
+#: Dimensionless numbers are rounded to this number of bits; a double has 53 bits. Numbers whose relative
+#: difference is much less than 2^-44, about 6e-14, nearly always become equal and then share one solution.
 CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Round dimensionless numbers, so that numbers that differ only by rounding errors become equal."""
+    """Round dimensionless numbers, so that numbers that differ only by rounding errors nearly always become equal."""
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
@@ -234,8 +237,9 @@ class Block(Generic[P]):
     with one value in SI units for each case.
     * `realisations`: indices of the realisations. All random numbers of a realisation follow from its index and `seed`.
     * `outputs`: names of the arrays to compute, including the companions that hold errors.
-    * `accuracy`: largest allowed relative discretisation error of every output with `has_error`. If the output can be
-    zero, the model may divide the errors of small values by a fixed size instead of the output.
+    * `accuracy`: largest allowed relative discretisation error of every output with `has_error`, or None if the
+    campaign gives no accuracy. For an output that can be zero, the model may set a floor. If the output is below its
+    floor, the error is divided by the floor.
     """
 
     parameters: P
@@ -315,15 +319,16 @@ class Model(Generic[P]):
     * `summary`: one line for ``mdr-dask models``.
     * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
     * `compute`: a pure function. The outputs of a case depend on the parameters of the case, the seed and the
-    realisation, but not on the other cases of the block. If a case fails, the function raises no exception.
+    realisation, but not on the other cases of the block. If a case fails, the function raises no exception, but
+    returns the status and the reason in `Result`.
     * `operations`: a fast function that returns the approximate number of floating-point operations of a block. This
     number determines the sizes of blocks. If `operations` is None, a study with n results is divided into about sqrt(n)
     blocks.
-    * `whole`: parameters whose axes are not divided among blocks, because the cases along such an axis share work. If a
-    block becomes too large, the axis of the last parameter in `whole` is divided first.
-    * `coordinates`: coordinates of all dimensions of outputs except case and realisation.
-    * `units`: the actual unit of each output or parameter whose declared unit does not apply, as in a dimensionless
-    campaign.
+    * `whole`: parameters whose axes are not divided among blocks if possible, because the cases along such an axis
+    share work. If a block would be too large, the axis of the last parameter in `whole` is divided first.
+    * `coordinates`: a function that returns the coordinates of all dimensions in `Output.dims`.
+    * `units`: a function that returns the actual unit of each output or parameter whose declared unit does not apply,
+    as in a dimensionless campaign.
     * `notes`: a function that returns notes for ``check`` about a study. The argument is a sequence of parameter sets,
     one for each tried value of each axis. A nested parameter set can have its own method `notes`.
     """
@@ -360,7 +365,7 @@ class Model(Generic[P]):
         return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return `names` and the names of their `scatter` outputs.
+        """Return `names` and the names of their `scatter` outputs, in the order of `Model.outputs`.
 
         Each name is followed by the name of its companion, if any.
         """

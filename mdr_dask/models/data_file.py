@@ -37,7 +37,7 @@ class DataFile(BaseModel):
         return content
 
     def read_text(self) -> str:
-        """Return the text of the file. Raise DataError if the file has changed or is not text."""
+        """Return the text of a text file or workbook. Raise DataError if the file has changed or is of another kind."""
         return decoded(self.read_bytes(), self.path)
 
     @contextmanager
@@ -49,7 +49,10 @@ class DataFile(BaseModel):
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note that states the columns of a table and their ranges. Return () if the columns have no names."""
+        """Return a note that states the columns of a table and their ranges.
+
+        Return () if the columns have no names, or if the file cannot be read as a table.
+        """
         return _notes_of_file(self)
 
 

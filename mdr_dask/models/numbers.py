@@ -31,7 +31,8 @@ def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float
 def entries_of(axis: Mapping[str, Any]) -> dict[tuple[str, ...], list[Any]]:
     """Return the parameters inside the values of a stored axis, such as the radius of each indenter on an axis.
 
-    The key is the path of a parameter in the campaign. The list has None where a value of the axis lacks the parameter.
+    The keys are the paths of the parameters in the campaign. Each list has one element for each value of the axis: a
+    number, a text, or None if the value lacks the parameter.
     """
     path = tuple(axis["path"].split("."))
     each = [dict(_leaves(value, path)) if isinstance(value, dict) else {} for value in axis["values"]]

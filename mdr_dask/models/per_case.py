@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import random_stream
 from mdr_dask.models.base import Block, Result, Status
 
-#: Time in s after which a case raises TimeoutError, or None for no limit. The limit applies only in a process that
-#: handles the alarm signal.
+#: Time in s after which the alarm signal SIGALRM is sent to this process, or None for no limit. A process that sets a
+#: limit must also set a handler that raises TimeoutError, as `mdr_dask.execute.children` does.
 time_limit: float | None = None
 
 #: Folder of the package mdr_dask.
@@ -35,9 +35,9 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     same random numbers. `solve` returns a mapping from the name of each output to its value. If an output has an error,
     `solve` also returns this error, as ``<output>_error``.
 
-    A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
-    declared, is not real, does not have the declared shape, or is not finite although ``allow_nan`` is False. A case
-    also fails if an error is negative.
+    A case fails if `solve` raises an exception, even SystemExit, but not if the user presses Ctrl-C. A case also fails
+    if an output is missing, is not declared, is not real, does not have the declared shape, or is not finite although
+    ``allow_nan`` is False. A case also fails if an error is negative.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -72,7 +72,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
 
 
 def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
-    """Solve a case, and interrupt the solution by an alarm after the time limit."""
+    """Solve a case, and send the alarm signal to this process if the solution takes longer than the time limit."""
     if time_limit is None:
         return solve(parameters, random)
     signal.setitimer(signal.ITIMER_REAL, time_limit)
@@ -83,7 +83,11 @@ def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Return whether an exception comes from Ctrl-C. Only the main thread receives Ctrl-C."""
+    """Return whether an exception comes from Ctrl-C.
+
+    Only the main thread receives Ctrl-C, and only in a process that does not ignore SIGINT. Any other KeyboardInterrupt
+    is raised by the user's function.
+    """
     is_main = threading.current_thread() is threading.main_thread()
     return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 
@@ -101,7 +105,8 @@ def where(error: BaseException) -> str:
     """Return where the user's function failed, such as `` (model.py:12)``.
 
     If another package raised the exception, the text names the line of the user's file that called that package. The
-    text is empty if mdr_dask raised the exception, for example because of an invalid output.
+    text is empty if the exception was raised after the user's function returned, for example because of an invalid
+    output.
     """
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     others = [(file, line) for file, line in frames if not file.startswith(PACKAGE)]
@@ -144,7 +149,7 @@ def _is_real(item: Any) -> bool:
 def _gathered(
     name: str, found: Mapping[tuple[int, int], Mapping[str, NDArray[np.float64]]], shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return one output for all cases, with NaN for failed cases."""
+    """Return one output for all cases, with NaN for failed cases. Raise ValueError if their shapes differ."""
     arrays = {place: outputs[name] for place, outputs in found.items()}
     extra = {array.shape for array in arrays.values()} or {()}
     if len(extra) > 1:

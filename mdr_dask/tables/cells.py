@@ -93,7 +93,7 @@ def grid_of(text: str, source: str) -> Grid:
 
 
 def _lines(text: str) -> Iterator[tuple[Line, str]]:
-    """Yield the lines of a text that are not empty."""
+    """Yield the lines of a text that contain more than separators and dashes, each with its place."""
     sheet, before = "", 0
     # a name in quotation marks may contain a line break
     text = re.sub(r'(?:^|(?<=[\n;,\t]))"[^"]*"(?=[;,\t\r\n])', lambda found: re.sub(r"\s+", " ", found[0]), text)
@@ -109,7 +109,7 @@ def separator_of(lines: Sequence[str]) -> str:
 
     A line counts only if it is split into several cells, and at least half of them are numbers. Lines split by commas
     or blanks count half, because commas also occur inside numbers, and blanks also occur before units. If no separator
-    splits a line into numbers, return the separator that occurs in the largest number of lines.
+    splits a line into numbers, return the separator, apart from blanks, that occurs in the largest number of lines.
     """
 
     def share(line: str, mark: str) -> float:

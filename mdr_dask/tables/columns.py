@@ -105,9 +105,9 @@ def read_columns(
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
     """Return the meaning of each column of the sheet.
 
-    In a sheet without names, `columns` describes the columns of the sheet in order. A needed `Column` that no name in
-    the sheet means is assigned to the unknown column with its dimension, if there is only one such column and only one
-    such `Column`.
+    In a sheet without names, `columns` describes the columns of the sheet in order. If no name in the sheet means a
+    needed `Column`, a column with an unknown name is taken for it, provided that no other unknown column and no other
+    `Column` has the same dimension. A `Column` of pure numbers is never found in this way.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -240,7 +240,10 @@ def listed(names: Sequence[str]) -> str:
 
 
 def numbers(sheet: Sheet) -> FloatArray:
-    """Return the cells of a table as numbers, with NaN for cells without a digit and for columns without numbers."""
+    """Return the cells of a table as numbers, with NaN for cells without a digit and for columns without numbers.
+
+    Raise DataError if a column of numbers has a cell that contains a digit but is not a number.
+    """
     values = np.array([floats(row) for row in sheet.cells])
     is_numeric = ~np.all(np.isnan(values), axis=0)
     places = np.argwhere(np.isnan(values) & is_numeric)

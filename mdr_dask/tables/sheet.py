@@ -78,7 +78,7 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 
 def read_head(text: str) -> Sheet:
-    """Return the first rows of a table, with the names and units of its columns. Raise DataError if it has no rows."""
+    """Read the first `HEAD_LINES` lines of a text as a table. Raise DataError if these lines contain no table."""
     return read_sheet("\n".join(text.splitlines()[:HEAD_LINES]), "")
 
 
@@ -151,7 +151,10 @@ def _head(grid: Grid, data: BoolArray, width: int) -> _Head:
 
 
 def _head_of_words(grid: Grid, is_name: Callable[[str], bool]) -> _Head:
-    """Find the line of names of a table whose cells may be words: the first line with a known name."""
+    """Find the line of names of a table whose cells may be words: the first line with a known name.
+
+    If no line has a known name, the first line of the table is the line of names.
+    """
     count = len(grid.cells)
     names = next((row for row in range(count) if any(is_name(split_unit(cell)[0]) for cell in grid.cells[row])), 0)
     grid.require([names] if grid.number[names].any() else [], "expected a line of names")

@@ -19,7 +19,10 @@ def is_table(path: str | Path) -> bool:
 
 
 def decoded(content: bytes, source: str) -> str:
-    """Return the content of a text file in UTF-8, UTF-16 or Windows-1252, or of an Excel workbook, as text."""
+    """Return the content of a text file in UTF-8, UTF-16 or Windows-1252, or of an Excel workbook, as text.
+
+    Raise DataError if the content is none of these.
+    """
     if content[:4] == b"PK\x03\x04":
         return _workbook(content, source)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):

@@ -208,7 +208,9 @@ def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
     assert (read.lowest, read.highest) == (293.15, 373.15)
     values[2] *= 1.05
     notes = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}", highest_temperature=400.05).oil.notes()
-    assert re.search(r"ASTM D341 fitted to 5 kinematic viscosities, .*; largest deviation \+4 % at 60 degC", notes[0])
+    assert re.search(
+        r"\(ASTM D341\) fitted to 5 kinematic viscosities, .*; largest deviation \+4 % at 60 degC", notes[0]
+    )
     ends = re.search(r"viscosities, (\S+) to (\S+) mm\^2/s", notes[0]).groups()
     assert [float(end) for end in ends] == pytest.approx([1e6 * given.kinematic(T) for T in (293.15, 373.15)], rel=0.05)
     assert notes[1:] == ("oil: the viscosity is extrapolated above 100 degC, to 126.9 degC",)

@@ -31,8 +31,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Floors (see `solve_film`). With the floor 1, the error of a spike position inside the contact is divided by the half
-#: width a.
+#: Floors of outputs (see `solve_film`). The spike position is stored as x/a. With the floor 1, its error is divided by
+#: the half width a if the spike lies inside the contact.
 _FLOORS = {"spike_position": 1.0}
 
 
@@ -89,7 +89,11 @@ def _estimates(
 
 
 def _spike(solution: LineSolution) -> Estimate:
-    """Return the position of the spike. The error is the change between the last grids plus the width of a cell."""
+    """Return the position of the spike and its error.
+
+    Two numbers are added: the width of the cell around the spike, and the larger of the last change between two grids
+    and half of the change before it. With fewer than three grids, the error is infinite.
+    """
     places = np.array([grid.spike for grid in solution.grids[-3:]])
     moves = np.abs(np.diff(places))
     moved = float(max(moves[-1], 0.5 * moves[-2])) if moves.size > 1 else np.inf

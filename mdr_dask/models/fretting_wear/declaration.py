@@ -243,7 +243,8 @@ class FrettingWear(Parameters):
             )
         if not self.dimensionless and (self.normal_force is None) == (self.depth is None):
             raise ValueError(
-                f"give either normal_force or depth, got normal_force {self.normal_force!r} and depth {self.depth!r}"
+                f"expected either normal_force or depth, got normal_force {self.normal_force!r} and "
+                f"depth {self.depth!r}"
             )
         if isinstance(self.indenter, Table) and self.depth is None:
             raise ValueError(

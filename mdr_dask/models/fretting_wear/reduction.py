@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 class Numbers:
     """The dimensionless numbers and the units. Every array has the shape (cases, realisations).
 
-    `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
-    stick border. In sliding wear, `level` is 0. `cycles` is the dimensionless number of cycles N, or in sliding wear
-    the dimensionless sliding distance. With ``wear_rule: limit``, `cycles` is 0, because the limiting profile does not
-    depend on N. `advance` is N divided by the parameter `cycles`, or the dimensionless sliding distance divided by the
-    parameter `path`. `length`, `height` and `force` are the units a0, d0 and E* d0 a0.
+    `exponent` is the exponent n of the body, or NaN for a table. `level` is g_c = 1 - G* U0 / (mu E* d0), the value of
+    the one-dimensional image at the stick border, divided by d0. In sliding wear, `level` is 0. `cycles` is the
+    dimensionless number of cycles N, or in sliding wear the dimensionless sliding distance. With ``wear_rule: limit``,
+    `cycles` is 0, because the limiting profile does not depend on N. `advance` is N divided by the parameter `cycles`,
+    or the dimensionless sliding distance divided by the parameter `path`. `length`, `height` and `force` are the units
+    a0, d0 and E* d0 a0. In a dimensionless campaign, these units are 1.
     """
 
     exponent: FloatArray
@@ -80,7 +81,8 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
     """Return log-normal factors of mean 1, shape (cases, realisations).
 
-    The standard deviation of the factors is the value of the parameter `name`.
+    The standard deviation of the factors is the value of the parameter `name`. `normal` contains a standard normal
+    random number for each realisation.
     """
     width = np.sqrt(np.log1p(block.numbers(name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
@@ -150,9 +152,9 @@ def _first_contact(
     modulus: FloatArray,
     messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the contact radius a0 and the indentation depth d0 before wear, for every case.
+    """Return the contact radius a0 and the indentation depth d0 before wear, in m, for every case.
 
-    Add a message for every case in which a0 cannot be computed, for example because a table ends at a radius below a0.
+    If a0 cannot be computed, for example because a table ends at a radius below a0, a0 is NaN and a message is added.
     """
     from mdr_dask.physics.mdr import power_law_contact as contact
 

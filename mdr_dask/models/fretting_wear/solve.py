@@ -88,7 +88,7 @@ def operations(block: Block[FrettingWear]) -> float:
         if held.any():
             every = numbers.exponent, numbers.level, numbers.cycles, numbers.xi
             total += of_profiles * _count(*(part[held] for part in every))
-    return 2 * total  # about as many for coarser solutions
+    return 2 * total  # the coarser solutions of the error estimate together need about as many operations
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
@@ -152,9 +152,10 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
 def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
-    """Compute all cases of a block together, by `rules.limit_cases` or `rules.fast_cases`.
+    """Compute the cases of a block together, by `rules.limit_cases` and `rules.fast_cases`.
 
-    Return the number of distinct cases. Each distinct case is computed only once.
+    `good` is the mask of the cases and realisations to compute. Return the number of distinct cases. Each distinct case
+    is computed only once.
     """
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
@@ -214,7 +215,10 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Checked], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution. An output ``block_...`` has one row for each block of the load history."""
+    """Return one output of a solution.
+
+    An output ``block_...`` has one row for each block of the load history. Any other output belongs to the last block.
+    """
     plain, is_error = _plain_name(name)
     answers = []
     for one in records if name.startswith("block_") else records[-1:]:

@@ -18,7 +18,10 @@ DOUBLINGS = 3  # largest number of grids that are finer than the coarsest grid, 
 
 
 def points_for(modes: int) -> tuple[int, ...]:
-    """Return the number of points of each grid, from coarse to fine. `modes` is the number of waves of a line."""
+    """Return the number of points of each grid, from coarse to fine.
+
+    `modes` is the length of a line divided by its shortest wavelength.
+    """
     from scipy.fft import next_fast_len
 
     least = next_fast_len(min(int(np.ceil(LEAST_PER_WAVE * modes)), MOST_POINTS), real=True)
@@ -55,7 +58,11 @@ class GeneratedPair:
         return ""
 
     def combined_rms(self) -> float:
-        """Return the rms height of the sum of the two lines. Mean squares are averaged over all files."""
+        """Return the rms height of the sum of the two lines.
+
+        It is sqrt(2) for self-affine lines. For measured surfaces it is in m, and the mean squares of the heights are
+        averaged over all files of a surface.
+        """
         if not isinstance(self.roughness, tuple):
             return float(np.sqrt(2.0))
         squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._amplitudes()]
@@ -151,7 +158,7 @@ class MeasuredPair:
         return first, second
 
     def _levelled(self) -> list[FloatArray]:
-        """Return the lines without mean and tilt. The two ends of a line then meet without a large step."""
+        """Return the lines without mean and tilt. A tilt would cause a step where the two ends of a line are joined."""
         from mdr_dask.physics.surfaces.measured import detrended
 
         return [detrended(height[: self.points[-1]], "line") for height in self._heights()]

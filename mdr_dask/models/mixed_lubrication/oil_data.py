@@ -81,7 +81,8 @@ class OilData(Parameters):
     def two_viscosities(self) -> tuple[float, float, float, float]:
         """Two temperatures in K, each followed by the kinematic viscosity in m^2/s at this temperature.
 
-        The viscosities are given by the user, or are computed from the law that is fitted to the table.
+        Either the user gives these numbers, or they are the lowest and the highest temperature of the table, with the
+        viscosities that the fitted law gives there.
         """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
@@ -107,8 +108,9 @@ class OilData(Parameters):
             worst = int(np.argmax(abs(off)))
             first, last = (found.at(float(temperature[end])) * 1e6 for end in (0, -1))
             notes.append(
-                f"table {self.viscosities.name}: ASTM D341 fitted to {off.size} kinematic viscosities, {first:.4g} to "
-                f"{last:.4g} mm^2/s; largest deviation {off[worst]:+.2g} % at {shown(float(temperature[worst]), 'K')}"
+                f"table {self.viscosities.name}: Walther's law (ASTM D341) fitted to {off.size} kinematic viscosities, "
+                f"{first:.4g} to {last:.4g} mm^2/s; largest deviation {off[worst]:+.2g} % "
+                f"at {shown(float(temperature[worst]), 'K')}"
             )
         one, _, two, _ = self.two_viscosities
         ends = ((self.lowest_temperature, min(one, two), "below"), (self.highest_temperature, max(one, two), "above"))

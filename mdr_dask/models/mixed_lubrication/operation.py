@@ -1,4 +1,4 @@
-"""Results for the smooth rollers of a case: Hertzian contact, oil film, load sharing and friction."""
+"""Results that are the same in all realisations of a case: Hertzian contact, oil film, load sharing and friction."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ class Operation:
     """The smooth contact and the film of a case.
 
     `viscosity` is the dynamic viscosity in Pa s at ambient pressure. `smooth` is the contact in dimensionless numbers.
-    `film` is the film thickness in m, and `film_error` its relative error.
+    `film` is the film thickness in m, and `film_error` its relative error. `asperity_share` is the fraction of the load
+    that asperities carry. `warning` is empty if there is none.
     """
 
     case: MixedLubrication
@@ -77,7 +78,10 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
     accuracy = accuracy or ACCURACY
 
     def smooth(share: float) -> LineContact:
-        """Return the smooth contact with load and modulus multiplied by `share` (see `load_sharing`)."""
+        """Return the smooth contact with load and modulus multiplied by the film's `share` of the load.
+
+        This is the scaling of `load_sharing`.
+        """
         numbers, modulus = (W, U / share, G * share), case.contact_modulus * share
         return line_contact(numbers, modulus, viscosity_law=case.viscosity_law, viscosity=viscosity)
 
@@ -121,10 +125,13 @@ def _asperity_share(case: MixedLubrication, rms: float, film: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _solved(contact: LineContact, accuracy: float) -> tuple[float, float]:
-    """Return the central film thickness of the EHL solution in units of ``a^2/R``, and its relative error."""
+    """Return the central film thickness of the EHL solution in units of ``a^2/R``, and its relative error.
+
+    Return zeros if the film is too thin for the grids. Raise NoFilmError if there is no solution for another reason.
+    """
     solution = solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
-        return 0.0, 0.0  # the film is too thin for the grids: the asperities will carry nearly the whole load
+        return 0.0, 0.0  # `share_load` then tries a smaller load share of the film
     if solution.reason:
         raise NoFilmError(solution.reason)
     film = solution.central_film
@@ -161,7 +168,10 @@ def fixed_values(operation: Operation) -> dict[str, float]:
 
 
 def friction(operation: Operation, film: float, asperity_share: float) -> float:
-    """Return the coefficient of friction: boundary friction of the asperities plus shear of the film."""
+    """Return the coefficient of friction: boundary friction of the asperities plus shear of the film.
+
+    In pure rolling, the coefficient is 0.
+    """
     case = operation.case
     sliding = abs(case.slide_roll_ratio) * case.rotation_speed * case.roller_radius
     if sliding == 0:

@@ -17,7 +17,8 @@ from mdr_dask.physics.surfaces.splines import heights
 
 #: Largest number of parts of a revolution. The scatter between the parts gives the standard error.
 PARTS = 16
-#: Width of a window divided by the distance between windows, for sliding rollers on the coarsest grid; chosen by trial.
+#: Width of a window divided by the distance between windows, for sliding rollers on the coarsest grid. The value was
+#: chosen by trial.
 WINDOWS = 4
 
 
@@ -82,7 +83,7 @@ def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> Int
 
 
 def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> dict[str, float]:
-    """Return the scalar outputs of a realisation and their errors.
+    """Return the scalar outputs that need rough lines, and their errors, for one realisation.
 
     `errors` contains the error of the probability and the error of the length in m. Conductance and resistance are
     computed for all independent squares across the rollers, connected in parallel.

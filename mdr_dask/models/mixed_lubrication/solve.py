@@ -36,7 +36,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
     """Solve the cases of a block. One realisation is one revolution of the rollers with random lines.
 
     In each realisation, cases that differ only in load, speed, temperature, rms height or boundary layer have the same
-    lines.
+    lines, apart from the scale of the heights.
     """
     shape = (block.cases, len(block.realisations))
     result = Result(MODEL.empty_arrays(block, shape), np.full(shape, Status.MISSING, dtype=np.int8))

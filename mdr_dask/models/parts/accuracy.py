@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 
-# Relative accuracy of friction if the campaign gives no accuracy. Friction on different surfaces differs by more.
+# Relative accuracy if the campaign gives no accuracy. Friction differs by more than this from one surface to another.
 ACCURACY = 0.01
 
 

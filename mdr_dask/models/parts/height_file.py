@@ -50,7 +50,8 @@ class Scan(NamedTuple):
 class _Grid(NamedTuple):
     """Heights in the unit of a file.
 
-    The rows run along x. The steps of the grid along x and y are in the unit of the positions.
+    The rows run along x. The steps of the grid along x and y are in the unit of the positions, or None if the file has
+    no positions. `stated` are the units and spacings that the file states.
     """
 
     rows: FloatArray
@@ -117,7 +118,7 @@ def read_scan(file: DataFile, units: Units) -> Scan:
 
 
 def dimensions(file: DataFile) -> int:
-    """Return 2 if a file holds a map, and 1 if it holds a line scan or another table with few columns."""
+    """Return 2 if a file contains a map, and 1 for any other file, such as a line scan."""
     if file.name.lower().endswith(".npy"):
         return 2
     if (channel := _channel(file)) is not None:
@@ -138,7 +139,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     Unit and spacings are taken from the file or from the options of the user. If the unit of the positions is missing
     and the user states the spacing, the unit is taken as the power of ten of a metre that fits the spacing. For
     positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... without a unit are taken
-    as indices of points.
+    as indices of points. Raise DataError if a unit or the spacing is missing, or if the file contradicts the user.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -189,7 +190,7 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file, read by SurfaceTopography. Return None for a text file."""
+    """Return the main channel of a file, read by SurfaceTopography. Return None for a text file or a workbook."""
     file.read_bytes()  # raises an error if the file has changed
     import warnings
 
@@ -335,7 +336,7 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
     for key, values in found.items():
         if len({to_si(f"1 {v}" if key in ("height", "position") else v, "m") for v in values}) > 1:
             lines = " and ".join(repr(line.strip()) for line in values.values())
-            raise DataError(f"{file.name}: states more than one {key}: {lines}: remove all lines but the correct one")
+            raise DataError(f"{file.name}: contradictory lines about {key}: {lines}: remove all but the correct one")
     only = {key: next(iter(values)) for key, values in found.items()}
     spacing, spacing_y = (to_si(only[key], "m") if key in only else None for key in ("spacing", "spacing_y"))
     return Units(only.get("height", ""), only.get("position", ""), spacing, spacing_y)
@@ -391,6 +392,7 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: FloatArray
     """Return the index and the unit of each of the columns x, y and z. Return () if one of these columns is missing.
 
     If the columns have no names, there must be exactly three columns apart from row numbers: x, y and z, in this order.
+    If the numbers of one of these columns only rise or only fall, the table is a line scan, and () is returned.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)

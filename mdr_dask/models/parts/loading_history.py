@@ -22,7 +22,7 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 
 
 class Jump(Parameters):
-    """One jump of the velocity by `velocity_change`, after steady sliding."""
+    """One jump of the velocity by the relative change `velocity_change`, after steady sliding."""
 
     shape: Literal["jump"] = "jump"
 
@@ -119,7 +119,7 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
     `velocity` and `force` are the parameters of the sliding body, and `change` is the relative change of the velocity
-    at a jump. The last piece ends at t = infinity.
+    at a jump. The last piece ends at t = infinity. Raise DataError if the protocol contradicts `velocity` or `force`.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

@@ -216,7 +216,7 @@ def fit_error(material: Material | None) -> float:
 def frequencies(material: Material) -> tuple[float, float] | None:
     """Return the lowest and highest angular frequency, in rad/s, of the data of a power law or a table.
 
-    The frequencies are shifted to the material's temperature.
+    The frequencies are shifted to the material's temperature. Return None for other materials.
     """
     fit = _fit_of(material)
     if fit is None:

@@ -25,7 +25,9 @@ _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|te
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
 #: Pairs of columns. Each pair determines storage and loss modulus.
 WAYS = (("storage modulus", "loss modulus"), ("storage modulus", "tan delta"), ("complex modulus", "phase angle"))
-SAME_TEMPERATURE = 1.0  # K; rows of a table whose temperatures differ by at most this belong to one curve
+#: Temperature difference in K. If the temperatures of a table are sorted, neighbouring temperatures that differ by at
+#: most this value belong to one curve.
+SAME_TEMPERATURE = 1.0
 
 
 class ModulusTable(NamedByFile):
@@ -184,7 +186,10 @@ def _vertical(chosen: ModulusTable) -> str:
 
 @lru_cache(maxsize=16)
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
-    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text with log10 a_T."""
+    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text.
+
+    The text states log10 a_T at the lowest and the highest temperature.
+    """
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     omega, storage, loss, temperature = _measured(chosen)
@@ -273,7 +278,10 @@ def _table(chosen: ModulusTable) -> Read:
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage modulus, loss modulus and temperature of each row, in SI units."""
+    """Return angular frequency, storage modulus, loss modulus and temperature of each row, in SI units.
+
+    The temperature is None if the table has no such column. Raise DataError if the table contradicts `chosen`.
+    """
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = (table[column] for column in ("frequency", "storage modulus", "loss modulus"))
     temperature, wanted = table.get("temperature"), chosen.table_temperature

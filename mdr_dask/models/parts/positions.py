@@ -16,7 +16,10 @@ FEW_LEVELS = 10  # largest number of distinct heights of a designed surface such
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
-    """Return, for each row of a table, whether its numbers only rise or only fall, as positions and row numbers do."""
+    """Return, for each row of a table, whether its numbers only rise or only fall, as positions and row numbers do.
+
+    More than half of the differences between neighbours must be finite and not 0.
+    """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
     one_way = np.all((steps >= 0) | ~known, axis=1) | np.all((steps <= 0) | ~known, axis=1)
@@ -27,7 +30,8 @@ def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None,
     """Remove positions and row numbers from the outermost rows and columns of a table of heights.
 
     Return the heights, the steps of the positions along x and y, and remarks that name the removed rows and columns.
-    The step along x is None if the table has no positions along x. The same applies to y.
+    The step along x is None if the table has no positions along x. The same applies to y. A table with fewer than
+    ``4 * OUTER`` rows or columns is returned unchanged.
     """
     if min(rows.shape) < 4 * OUTER:
         return rows, (None, None), ()
@@ -81,7 +85,8 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
 def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """Return the index of each position on a regular grid, counted from 0, and the step of the grid.
 
-    There may be grid points without a position. Raise DataError if a position is half a step or more off the grid.
+    There may be grid points without a position. Raise DataError if a position is half a step or more off the grid, if a
+    position is NaN, or if all positions are equal.
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
@@ -105,7 +110,8 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
     """Arrange points, given in any order, in rows of heights. Return the rows and the steps along x and y.
 
-    Grid points without a height become NaN.
+    Grid points without a height become NaN. Raise DataError if two points have the same place, or if fewer than a
+    quarter of the grid points are given.
     """
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1
@@ -122,8 +128,8 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     The largest number is replaced if its distance from the next smaller number exceeds the range of the inner numbers,
     which are all numbers without the smallest and the largest. The same applies to the smallest number. A number that
     occurs only once may be the height of a narrow groove or peak. Such a number is replaced only if its distance from
-    the next number exceeds `SAFETY` times the range. A surface such as a grating, with at most `FEW_LEVELS` distinct
-    inner numbers, is left unchanged.
+    the next number exceeds `SAFETY` times the range. These steps are repeated until no number is replaced. A surface
+    such as a grating, with at most `FEW_LEVELS` distinct inner numbers, is left unchanged.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

@@ -124,7 +124,7 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return notes on whether the moduli of each material are known at the frequencies of a study.
+    """Return notes on whether the data of each power law or table of moduli cover the frequencies of a study.
 
     At the sliding velocity v, a wave of the roughness with the wave number q excites the angular frequency q v.
     """

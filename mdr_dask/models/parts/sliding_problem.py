@@ -52,11 +52,11 @@ class Setting:
 class SlidingProblems:
     """The cases of a block as dimensionless numbers.
 
-    `which` holds the index into `settings` for every case, or -1 for a case that cannot be solved. `loads` are F_N / (4
-    G_inf L h) with the static shear modulus G_inf. `deborah` are the Deborah numbers eta v / (G_inf L) with the
-    viscosity eta. For a Kelvin body, the Deborah number is v tau / L. `length` is the length L of the line in m.
-    `height` is the rms height h in m, or L if there is no roughness. `faults` has a message for each case that cannot
-    be solved. The key is the index of the case.
+    `which` holds the index into `settings` for every case, or -1 for a case that cannot be solved. `loads` are
+    F_N / (4 G_inf L h) with the static shear modulus G_inf. `deborah` are the Deborah numbers eta v / (G_inf L) with
+    the viscosity eta of the dashpot, which is 0 for a solid without a dashpot. For a Kelvin body, the Deborah number is
+    v tau / L. `length` is the length L of the line in m. `height` is the unit of height h in m: the rms height, or L if
+    there is no roughness. `faults` has a message for each case that cannot be solved. The key is the index of the case.
     """
 
     settings: list[Setting]
@@ -89,7 +89,7 @@ class SlidingProblems:
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
     """Find the distinct rows of a table with the given columns. Objects are compared by identity.
 
-    Return the first index of each distinct row in the table, and for every row its index among the distinct rows.
+    Return the index of the first occurrence of each distinct row, and for every row its index among the distinct rows.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -142,7 +142,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
 def _without_units(body: PowerLaw | None, length: float, height: float) -> PowerLaw | None:
     """Return the profile of an indenter with positions divided by `length` and heights divided by `height`.
 
-    The numbers are rounded, so that cases that differ only by rounding errors have equal profiles.
+    The numbers are rounded (see `canonical`), so that cases that differ only by rounding errors share a profile.
     """
     if body is None:
         return None

@@ -1,4 +1,4 @@
-"""A measured surface of a campaign, given by a spectrum, by maps, by scans, or by a line that is used unchanged."""
+"""A measured surface of a campaign, given by a spectrum, by maps, by scans, or by a profile that is itself the line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Surface(Parameters):
         default=None, description="height profile along a straight line on an isotropic surface; its spectrum is used"
     )
     profile: ProfileFile | None = Field(
-        default=None, description="height profile that is used unchanged as the rough line"
+        default=None, description="height profile that is itself used as the rough line"
     )
     longest_wavelength: float | None = quantity(
         "m", "longest wavelength of the roughness; longer waves are removed", usual="1 mm", default=None, gt=0
@@ -134,7 +134,8 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
     """Return a spectrum between the cut-off wavelengths.
 
-    Without `shortest_wavelength`, the spectrum ends where noise begins.
+    Without `shortest_wavelength`, the spectrum ends where noise begins. Raise DataError if a given cut-off wavelength
+    lies outside the spectrum.
     """
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
@@ -158,7 +159,8 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
     """Return the amplitudes, in m, of the lines that replace a surface in the method of dimensionality reduction (MDR).
 
-    There is one line for each file of the surface.
+    There is one line for each file of the surface. Raise DataError if the spectrum of a file has no waves that fit the
+    line.
     """
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):

@@ -43,8 +43,9 @@ WAYS = [(place, kind) for kind in KINDS for place in ("wavenumber", "wavelength"
 
 class Found(NamedTuple):
     """The spectrum C2D of a surface, limited to the wave numbers in its file.
+
     `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found. `error` contains
-    the standard errors of log C2D if the spectrum was computed from the spectrum of straight profiles.
+    the standard errors of log C2D if C2D was computed from the spectrum of straight profiles, and is None otherwise.
     """
 
     spectrum: Spectrum
@@ -173,7 +174,11 @@ def scan_of(options: Any, file: DataFile) -> Scan:
 
 @lru_cache(maxsize=64)
 def line_of_scan(options: Any, file: DataFile, *taper_and_band: float) -> MeasuredLine:
-    """Return a scan without its trend. `options` has the attribute `detrend` and those that `scan_of` needs."""
+    """Return a scan without its trend as one period of a line.
+
+    `options` has the attribute `detrend` and those that `scan_of` needs. `taper_and_band` are the last three parameters
+    of `measured_line`: the taper, and the shortest and the longest wavelength.
+    """
     from mdr_dask.physics.surfaces.measured import measured_line
 
     scan = scan_of(options, file)

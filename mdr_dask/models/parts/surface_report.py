@@ -59,9 +59,9 @@ of its 95 % confidence interval (`_low` and `_high`).
 class FileReport(NamedTuple):
     """Report on one file.
 
-    `row` contains a value for each name in `UNITS`. `bins` contains C2D and the standard error of log C2D. `cuts`
-    contains the wave numbers and the power spectrum, in m^3, of straight profiles. The key is "x" or "y", the direction
-    of the profiles. `law` is the fitted power law, or None if no power law fits.
+    `row` contains a value for each name in `UNITS`. `bins` contains wave numbers, C2D and the standard error of
+    log C2D. `cuts` contains the wave numbers and the power spectrum, in m^3, of straight profiles. The key is "x" or
+    "y", the direction of the profiles. `law` is the fitted power law, or None if no power law fits.
     """
 
     file: DataFile
@@ -124,7 +124,8 @@ def _of_scan(scans: ScanFiles, file: DataFile, row: dict[str, float | str]) -> d
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the wave numbers of the first spectrum, the mean spectrum, and the relative standard error of the mean.
 
-    At each wave number, the mean includes only the spectra whose range contains this wave number.
+    At each wave number, the mean includes only the spectra whose range contains this wave number. If there is only
+    one such spectrum, the standard error is NaN.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

@@ -29,7 +29,7 @@ class Wlf(Parameters):
     reference: float = quantity("K", "reference temperature for c1 and c2, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K. Raise ValueError for temperatures at which the law diverges."""
+        """Return a_T for temperatures in K. Raise ValueError at or below reference - c2, where the law diverges."""
         from mdr_dask.physics.solids import wlf_factor
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2

@@ -23,7 +23,10 @@ PAGE = "docs/validity.md"
 
 
 def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note if the largest load of a study exceeds `LARGEST_LOAD`."""
+    """Return a note if the largest load of a study exceeds `LARGEST_LOAD`.
+
+    Only plane bodies with the spectrum of a measured surface are checked.
+    """
     from mdr_dask.models.parts.material import solid_of
 
     loads = []

@@ -20,10 +20,10 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 OPERATIONS_A_POINT = 10  # operations of a solution for each point of the line, chosen by trial for block sizes
-#: The solution of a general solid with n Prony terms needs about this number, times n (1 + n), of operations for each
-#: point. It is solved on at least three grids with 1, 2 and 4 nodes per point. About five sweeps over each grid need n
-#: operations for each node. About 15 products of the matrix of Newton's method need 3 n^2 operations in each contact
-#: and each free recovery, of which there is about one for every four points.
+#: For each point, the solution of a general solid needs about this number times n (1 + n) operations. n is the number
+#: of Prony terms plus 1. The three coarsest grids have 1, 2 and 4 nodes per point, together 7. About five sweeps over
+#: each grid need n operations for each node, together 35 n. On each grid there is about one contact or free recovery
+#: for every four points, which needs about 15 matrix products of 3 n^2 operations for Newton's method, together 34 n^2.
 OPERATIONS_OF_GENERAL = 35
 
 #: Outputs that have errors, each with the corresponding column of `Steady`.

@@ -123,7 +123,7 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
 
 
 def time_notes(sets: Sequence[VelocityJump]) -> tuple[str, ...]:
-    """Return a note with tau in seconds, the longest relaxation time of the materials of a study."""
+    """Return a note with tau in s, the longest relaxation time of a material, or with the range of tau in a study."""
     units = []
     for one in sets:
         if one.material is not None:

@@ -43,8 +43,8 @@ from mdr_dask.physics.transients.elements.loading_history import Piece, Trace, t
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 # Numbers of operations, chosen by trial, for block sizes. A jump needs `OPERATIONS_MARCHED` operations, times
-# the nodes, times the time steps per decade. A history needs `OPERATIONS_FOLLOWED` operations for each time step and
-# each spring or mode of an element.
+# the nodes, times the time steps per decade. A history needs `OPERATIONS_FOLLOWED` operations for each time step, each
+# element (one at each node), and each spring or mode of the element.
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 100
 
 #: Names of the outputs for which errors are estimated.
@@ -182,9 +182,9 @@ class _Group(ABC):
     def _floor(self, found: _Found, name: str) -> FloatArray:
         """Return the floor of an output for every case (see `missed_accuracy`).
 
-        The floor of a depth is 1, because depths are divided by the rms height. If friction is zero within its error,
-        as for a body at rest, the floor is the largest absolute friction of the case. The floor of any other friction
-        is 0.
+        The floor of a depth is 1, because depths are divided by the rms height. If an output of friction is zero within
+        its error, as for a body at rest, its floor is the largest absolute value of all friction outputs of the case.
+        Otherwise its floor is 0.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
