@@ -82,7 +82,7 @@ STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
     ),
     "calibration on a surface": (SLIDING + SPECTRUM + RIG + MEASURED, {}, {"calibration", "plateau"}),
     "jumps on a spectrum": (JUMP + SPECTRUM + KELVIN + SPEEDS, {}, OF_JUMPS | {"relaxation"}),
-    "jumps on a profile": (JUMP + PROFILE + KELVIN + SPEEDS, {}, OF_JUMPS | {"relaxation"}),
+    "jumps on a profile": (JUMP + PROFILE + KELVIN + SPEEDS, {}, OF_JUMPS),
     "jumps of three sizes on a scan": (
         JUMP + SCAN + KELVIN + TWO_SPEEDS + "  velocity_change: [0.1, 0.2, 0.5]\n",
         {"failed": True},

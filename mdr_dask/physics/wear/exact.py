@@ -47,9 +47,9 @@ class Resolution(NamedTuple):
         """Number of nodes in a panel.
 
         If the allowed error falls to a quarter, a panel has one more node, because the panels far from the border and
-        the edge do not become narrower.
+        the edge do not become narrower. With more than six nodes, time steps may fail.
         """
-        return 2 + round(float(np.log(COARSEST / self.accuracy) / np.log(4.0)))
+        return min(2 + round(float(np.log(COARSEST / self.accuracy) / np.log(4.0))), 6)
 
     @property
     def step(self) -> float:
