@@ -74,7 +74,7 @@ def test_error_of_the_transient_covers_it() -> None:
 def test_bad_line_is_a_status() -> None:
     result = compute(of_line({}, longest_wavelength=1e-6))
     assert np.all(result.status == Status.FAILED)
-    assert all("cut-off" in message for message in result.messages.values())
+    assert all("longest wavelength" in message for message in result.messages.values())
     assert np.all(np.isnan(result.values["friction_coefficient"]))
 
 
