@@ -1,8 +1,9 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
 Every new value lies halfway between two older values on the scale of the axis. Cases that differ in other parameters
-therefore share values of the axis. To test an interval, the output is predicted from the results at older values only.
-The interval is halved if the error of the prediction exceeds the tolerance.
+therefore share values of the axis. To test an interval, the output inside it is predicted from the results at the
+values that are older than its newer end. The interval is halved if this prediction differs from the interpolation of
+all results by more than the tolerance.
 """
 
 from __future__ import annotations
@@ -172,9 +173,9 @@ def refined(mesh: Mesh, means: Mapping[str, Means]) -> tuple[Mesh, dict[str, int
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve, so that no combination of non-adaptive values needs more than `at_most` values.
+    """Return the intervals to halve, so that the adaptive axis has at most `at_most` values for all other parameters.
 
-    The widest intervals are first, so that one discontinuity does not use up all values.
+    The widest intervals are chosen first, so that one discontinuity does not use up all values.
     """
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
@@ -277,7 +278,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     count = max(len(groups) - 1, 1)
     around = missed[:, 1:] - missed[:, :1]
     scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; zero for one realisation
-    # with this quantile, scatter alone exceeds the allowance in any of the lines with a probability of 1 - CONFIDENCE
+    # at one position, scatter alone exceeds the allowance for an output with a probability of at most 1 - CONFIDENCE
     widely = ndtri(1 - (1 - CONFIDENCE) / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])

@@ -200,7 +200,7 @@ WRONG = {
     "no tolerance": ("shift: 1", "{adaptive: [1 m, 2 m]}", "", r"x\.until: .*missing|until"),
     "few": ("shift: 1", "{adaptive: [1 m, 2 m], until: 1 %, at_most: 4}", "", r"at_most: .* at least 5, got 4"),
     "same ends": ("shift: 1", "{adaptive: [1 m, 1 m], until: 1 %}", "", "expected two different ends"),
-    "output": ("shift: 1", "{adaptive: [1 m, 2 m], until: {yy: 1 %}}", "", r"until\.yy: this is none of the outputs"),
+    "output": ("shift: 1", "{adaptive: [1 m, 2 m], until: {yy: 1 %}}", "", r"until\.yy: this is not an output"),
 }
 
 

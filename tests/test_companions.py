@@ -50,7 +50,7 @@ def test_errors_false_leaves_them_and_their_work_out(toy):
             "outputs.0.: expected the output 'width' .its error is stored too, except",
         ),
         ("[height, width]", "[width]\nerrors: maybe", "errors: expected true or false, got 'maybe'"),
-        ("6", "{at_most: 20, until: {width_error: 1 %}}", "this is none of the outputs of the campaign"),
+        ("6", "{at_most: 20, until: {width_error: 1 %}}", "this is not an output of the campaign"),
     ],
 )
 def test_an_error_is_not_asked_for_by_name(toy, old, new, sentence):

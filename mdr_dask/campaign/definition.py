@@ -118,7 +118,7 @@ class Tolerance:
 class Refinement:
     """The rule by which a study chooses the values of an adaptive axis."""
 
-    # The interval of the axis. Outputs are interpolated on the same scale (linear or logarithmic).
+    # The interval of the axis and its scale, linear or logarithmic. Outputs are interpolated on this scale of the axis.
     spread: Spread
     # Largest interpolation error of each output. A relative error refers to the largest absolute value along the axis.
     until: Mapping[str, Tolerance]

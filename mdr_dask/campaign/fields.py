@@ -37,7 +37,7 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a single value of this field may be a list. Then a list without lists does not vary the field."""
+    """Return whether a single value of this field may be a list. Only a list of lists then varies the field."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 

@@ -32,7 +32,7 @@ def tolerances(
     for name, written in given.items():
         at = (*path, name)
         if name not in known:
-            document.report(at, f"this is none of the outputs of the campaign{did_you_mean(name, known)}", key=True)
+            document.report(at, f"this is not an output of the campaign{did_you_mean(name, known)}", key=True)
             continue
         try:
             found[name] = tolerance(written, model.output(name).unit)

@@ -24,9 +24,10 @@ def written_units(text: str) -> dict[str, str]:
 
 
 def units_in(data: Mapping[str, Any]) -> dict[str, str]:
-    """Return the unit of each parameter whose values with a unit all have the same unit.
+    """Return the unit in which the values of each parameter are written.
 
-    The keys are names of coordinates, such as ``indenter_radius``.
+    Values without a unit are ignored. Parameters with several units are left out. The keys are names of coordinates,
+    such as ``indenter_radius``.
     """
     series = data.get("series")
     found: dict[str, set[str]] = {}

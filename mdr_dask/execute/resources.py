@@ -15,7 +15,7 @@ class Resources:
     processes instead of threads, unless `threads` is given. `scheduler` is the address of a running Dask scheduler.
     `cluster` is a description from `mdr_dask.campaign.cluster.load_cluster`. `client` is a Dask client, which the run
     does not close. A run on a cluster ends with an error after `patience` seconds without any worker. If `case_timeout`
-    is given, a case fails after this time in s, and blocks are computed in child processes.
+    is given, a result that takes longer than this time in s fails, and blocks are computed in child processes.
     """
 
     threads: int | None = None

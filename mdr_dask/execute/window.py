@@ -35,10 +35,10 @@ Outcomes = list[tuple[Work, Outcome]]
 class TaskWindow:
     """The blocks that are submitted to a cluster at the same time: about twice as many as the cluster has threads.
 
-    The run ends with an error after `patience` seconds without any worker. A case fails after `case_timeout` seconds.
-    `most` is the largest number of threads of an adaptive cluster. For other clusters, `most` is 0. The function
-    `replace_lost`, if given, replaces lost workers. The function `last_message` returns the last error message of the
-    cluster.
+    The run ends with an error after `patience` seconds without any worker. A block that takes longer than
+    `case_timeout` seconds is halved, and a single result that takes longer fails. `most` is the largest number of
+    threads of an adaptive cluster. For other clusters, `most` is 0. The function `replace_lost`, if given, replaces
+    lost workers. The function `last_message` returns the last error message of the cluster.
     """
 
     def __init__(

@@ -4,7 +4,7 @@ Symbols: mu is the coefficient of friction, F_N is the normal force, and v is th
 and the rms height h. The body has the shear modulus G and the relaxation time tau.
 
 Friction against velocity has four regions. Friction is proportional to the velocity in region I, grows more slowly in
-region II, is at its plateau in region III, and falls in region IV. There are two zones of the load. In zone 1, at low
+region II, is at its plateau in region III, and falls in region IV. The loads fall into two zones. In zone 1, at low
 loads, the line is in partial contact. In zone 2, the line is in full contact.
 """
 
@@ -247,8 +247,8 @@ def _interpolation(data: xr.Dataset) -> Variables:
     used = rising(force, velocity, np.nan_to_num(table.mean()), force >= ZONE_ONE[0])
     if np.count_nonzero(used) < 5 or np.unique(velocity[used]).size < 3:
         raise FitError(
-            f"expected five cases with F_N / (G h L) above {ZONE_ONE[0]}, at three or more velocities up to the maximum"
-            f" of friction, got {int(used.sum())}"
+            f"expected at least five cases with F_N / (G h L) above {ZONE_ONE[0]} and velocities up to the maximum of "
+            f"friction, at three or more velocities, got {int(used.sum())} at {np.unique(velocity[used]).size}"
         )
     force, velocity, count = force[used], velocity[used], table.count(used)
 

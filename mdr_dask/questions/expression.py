@@ -83,7 +83,7 @@ class Expression:
 
 def parse(text: str) -> Expression:
     """Parse a condition or a formula. Raise DataError if the text is not a valid expression."""
-    wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7'"
+    wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7', or a formula such as 'velocity / 2'"
     marked, quantities = _without_units(text)
     try:
         tree = ast.parse(marked.strip(), mode="eval").body

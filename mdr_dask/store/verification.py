@@ -189,7 +189,10 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
 
 
 def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Compare the chunks of blocks with the digests in the records of these blocks. Return all file names of chunks."""
+    """Compare the chunks of blocks with the digests in the records of these blocks.
+
+    Return the names that the files of chunks may have, whether or not the files exist.
+    """
     blocks, known = group.blocks, set[str]()
     begun = 0
     for block in blocks.indices:

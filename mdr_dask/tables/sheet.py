@@ -83,7 +83,7 @@ def read_head(text: str) -> Sheet:
 
 
 def _numeric_columns(grid: Grid) -> BoolArray:
-    """Return a mask of the columns with numbers. Its length is the number of cells of most lines with numbers.
+    """Return a mask of the columns with numbers. Its length is the most frequent number of cells in lines with numbers.
 
     A column is numeric if at least half of the lines with this number of cells have a number in this column.
     """
@@ -223,7 +223,10 @@ def _temperatures(text: str, pattern: str = TEMPERATURE) -> list[Temperature]:
 
 
 def _with_temperatures(sheet: Sheet, temperatures: Sequence[Temperature | None]) -> Sheet:
-    """Add a column with the temperature of each row, unless a temperature is missing or the sheet has such a column."""
+    """Add a column with the temperature of each row.
+
+    The sheet is returned unchanged if it has no names, if a temperature is missing, or if it has such a column already.
+    """
     if not sheet.names or not all(temperatures) or any(is_called(name, "temperature") for name in sheet.names):
         return sheet
     values, units = zip(*filter(None, temperatures), strict=True)

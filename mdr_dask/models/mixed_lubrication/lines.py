@@ -139,8 +139,9 @@ class MeasuredPair:
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
-        """Return the splines of both lines through all points, or through every second point, shape (2, points).
+        """Return the splines of both lines, shape (2, points).
 
+        The splines go through every second point if `points` is half of the largest number of points.
         During one revolution at the mean velocity, with a slide-roll ratio S, the contact travels (1 + S/2) times the
         length of line 1, and (1 - S/2) times the length of line 2. The contact thus passes some points more often than
         others. Because both lines begin at random points, means over realisations are nevertheless unbiased.

@@ -264,7 +264,7 @@ def anisotropic(maps: MapFiles, file: DataFile) -> str:
 
 
 class LevelledMap(NamedTuple):
-    """A map after its trend is subtracted.
+    """A map after its trend has been subtracted.
 
     `height_rms` and `height_mean` are Sq and Sa of the measured points in m. `spectrum` is computed after
     missing points are filled in and the window is applied.

@@ -67,7 +67,7 @@ class _Found:
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
-    contact: FloatArray  # largest fraction of the line in contact
+    contact: FloatArray  # largest fraction of the line in contact at the computed times
     outcome: NDArray[np.int8]
 
 

@@ -125,7 +125,7 @@ def expected(
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
     """Interpolate at each position by the polynomial through `sides` nodes on each side of the position.
 
-    Near or beyond an end of the grid, the polynomial goes through the ``2 sides`` nodes at this end.
+    Near or beyond an end of the grid, the polynomial goes through the first or the last ``2 * sides`` nodes.
     """
     result = np.empty(positions.size)
     for k in range(positions.size):

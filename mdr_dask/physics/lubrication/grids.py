@@ -39,7 +39,10 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the positions with `wanted` cells upstream. The density is constant beyond the last of the `positions`."""
+    """Return the positions with `wanted` cells upstream.
+
+    If there are fewer cells, the density is constant from the last but one of the `positions` on.
+    """
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]

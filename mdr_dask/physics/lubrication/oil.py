@@ -30,7 +30,7 @@ def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[flo
     Parameters
     ----------
     temperature : array_like, shape (n,)
-        Temperatures in K. At least two temperatures must be unequal.
+        Temperatures in K. At least two temperatures must differ.
     viscosity : array_like, shape (n,)
         Kinematic viscosities in m^2/s at these temperatures.
 

@@ -216,9 +216,10 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return the load, d(load)/d(depth), the drag and d(drag)/d(depth) of a free recovery.
+    """Return the contributions of a free recovery to load and drag, each followed by its derivative by the depth.
 
-    The recovery begins with the displacement u, and extends over the distance `travelled`. The derivative of the drag
+    The load is the integral of u. The recovery begins with the displacement u, and extends over the distance
+    `travelled`. The derivative of the drag
     includes the shift of the place where contact begins again. At this place, the line has the slope `slope`.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0

@@ -189,7 +189,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
         a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
         inside = a * a - 3 * s0 * b
         root = math.sqrt(inside) if inside > 0 else 0.0
-        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # root = above / below, without cancellation
+        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # x = above / below, without cancellation
         x = above / below if below > 0 else 0.0
         x = x if (x > 0) & (x < 1) else 0.0
         top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)

@@ -152,7 +152,10 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
 
 
 def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int, depths: FloatArray | None) -> Steady:
-    """Solve cases on a grid without an estimate of the errors. Sweeps over cubic cells start from the given depths."""
+    """Solve cases on a grid without an estimate of the errors.
+
+    With cubic cells, the search for the depth starts from `depths`, if given.
+    """
     nodes = line.points * oversampling
     if request.scheme == "hermite":
         return steady.steady_sliding(line.cubic(nodes), *cases, depths)

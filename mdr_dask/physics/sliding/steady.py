@@ -207,8 +207,7 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Convert lengths to cell widths, and solve the cases whose Deborah number and load are finite and positive.
-
+    """Convert Deborah numbers and loads to the unit of a cell width, and solve the cases in which both are valid.
     All other cases are `INVALID`. If the line contains a number that is not finite, all cases are `INVALID`.
     """
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1

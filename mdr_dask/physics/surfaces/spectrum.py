@@ -66,12 +66,13 @@ class Spectrum:
         return amplitude
 
     def between(self, longest: float = 0.0, shortest: float = 0.0) -> Spectrum:
-        """Return the spectrum of the waves between two wavelengths, m; a wavelength of 0 means no limit."""
+        """Return the spectrum of the waves between two wavelengths in m. A wavelength of 0 means no limit."""
         low = max(2 * np.pi / longest if longest else 0.0, float(self.wavenumber[0]))
         high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
         if not low < high:
             ends = " to ".join(f"{2 * np.pi / q:.4g} m" for q in self.wavenumber[[0, -1]])
-            raise DataError(f"expected cut-offs within the wavelengths of the spectrum, {ends}")
+            what = f"expected a longest wavelength above the shortest wavelength, both within {ends}"
+            raise DataError(f"{what}, got {longest:.4g} m and {shortest:.4g} m")
         inner = (self.wavenumber > low * (1 + CLOSE)) & (self.wavenumber < high * (1 - CLOSE))
         q = np.concatenate([[low], self.wavenumber[inner], [high]])
         return Spectrum(q, self.at(q))

@@ -22,7 +22,7 @@ from mdr_dask.physics.wear.slip import GrossSlip, Moment, PartialSlip
 #: extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 #: Largest ratio of a time step to the previous one, chosen by trial. BDF of order 3 is unstable only if the ratio stays
-#: above 1.618 in many successive steps. With 1.8, more of the stated errors hold than with 1.618.
+#: above 1.618 in many successive steps. With 1.8, more estimated errors exceed the true errors than with 1.618.
 GROWTH = 1.8
 
 Problem = PartialSlip | GrossSlip
@@ -53,7 +53,7 @@ def march(
         time = history[-1].time
         if time + step == time:
             raise NotConvergedError(
-                f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law, at N or s (cycles or path) = {time:.6g}"
+                f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law, after {time:.6g} (cycles N or path s)"
             )
         moment, error = _try_step(problem, newton, history, time + step)
         change = 0.8 * (tolerance / max(error, 1e-300)) ** (1.0 / (min(len(history), 3) + 1))
@@ -90,7 +90,9 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
             continue
         next_time = 0.5 * (past[-1].time + next_time)
         if next_time == past[-1].time:
-            raise NotConvergedError(f"the wear law has no solution at N or s (cycles or path) = {time:.6g}")
+            raise NotConvergedError(
+                f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law, after {next_time:.6g} (cycles N or path s)"
+            )
     return past[-1]
 
 

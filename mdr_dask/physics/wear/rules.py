@@ -34,7 +34,7 @@ from mdr_dask.physics.wear.worn import (
 #: The third piece ends 30^2 = 900 widths of the first piece from the stick border. There, y of the logistic law differs
 #: from its limit 1 by about 1/900.
 LAYER_GROWTH = 30.0
-ERROR = 2e-6  # numerical error of every output, divided by its largest value; without the error of the fast rule itself
+ERROR = 2e-6  # numerical error of every output, divided by its largest value; it excludes the error of the fast rule
 
 
 _ABSCISSA, _WEIGHT = gauss(16)  # 16 nodes are sufficient for the accuracy `ERROR`

@@ -448,7 +448,7 @@ class GrossSlip:
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     def admits(self, unknowns: FloatArray) -> bool:
-        """Return True, because no solution of the equations is known that is impossible as a contact."""
+        """Return True, because all known solutions of the equations are possible contacts."""
         return True
 
     def start(self) -> Moment:

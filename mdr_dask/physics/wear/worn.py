@@ -65,7 +65,7 @@ class Worn:
         return np.asarray(found(places)) if name in FUNCTIONS else float(found)
 
     def known_error(self, name: str) -> float:
-        """Return the known relative error of an attribute."""
+        """Return the relative error of an attribute that solutions of different resolution may have in common."""
         is_radius = name in ("contact_radius", "stick_border") and getattr(self, name) > 0.0
         return self.relative_error + (self.radius_error / float(getattr(self, name)) if is_radius else 0.0)
 

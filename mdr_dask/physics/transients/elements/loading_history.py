@@ -229,7 +229,8 @@ class Piece:
     def instants(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
         """Return the times of all steps from the start of the piece to `end`, or None if there would be too many steps.
 
-        The first time step is short, and the time steps grow in a constant ratio up to the longest time step.
+        After a short first time step, the time since the start of the piece grows in a constant ratio, until the time
+        steps are as long as the longest time step. All further time steps are equal.
         """
         span = end - self.start
         if span <= 0:
