@@ -44,7 +44,7 @@ def load(name: str) -> Model[Any]:
     """Return the model called `name`.
 
     `name` is one of `names()`, or has the form ``package.module:NAME``. Raise ModelError if no model has this name,
-    or if the model cannot be imported.
+    or if a model from outside this package cannot be imported or is not a `Model`.
     """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
@@ -128,7 +128,10 @@ def _installed() -> dict[str, EntryPoint]:
 
 
 def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
-    """Import a model from outside this package. Every error of the import becomes a ModelError."""
+    """Import a model from outside this package. Every error of the import becomes a ModelError.
+
+    The functions of the model, except `compute`, are wrapped by `_guarded`.
+    """
     try:
         found = entry.load()
     except ModuleNotFoundError as error:
@@ -149,7 +152,10 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function that calls `function` of a model from outside this package. Exceptions become ModelErrors."""
+    """Return a function that calls `function` of a model from outside this package. Exceptions become ModelErrors.
+
+    ModelError is also raised if the function `operations` returns a number that is negative or not finite.
+    """
 
     def call(argument: Any) -> Any:
         try:

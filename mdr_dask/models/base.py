@@ -41,7 +41,9 @@ Whole = Annotated[int, BeforeValidator(unquoted)]
 
 
 class Parameters(BaseModel):
-    """Base class of every parameter set. Quantities are converted to SI units and checked against their bounds.
+    """Base class of every parameter set. Quantities are checked against their bounds.
+
+    When a campaign is read, quantities with a unit are first converted to SI units.
 
     A parameter set cannot be changed, and unknown keys are errors. A subclass may declare:
 
@@ -102,7 +104,10 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert a text such as ``20 mm`` to a number in SI units. Return a name such as ``auto`` unchanged."""
+        """Convert a text such as ``20 mm``, or each text in a list, to a number in SI units.
+
+        A name such as ``auto`` is returned unchanged. If no campaign is being read, only whole numbers are converted.
+        """
         if isinstance(value, list | tuple):
             return tuple(to_si(item, info) for item in value)
         value = unquoted(value)
@@ -131,7 +136,7 @@ def unit_of(parameters: type[BaseModel], name: str) -> str | None:
 
 
 def notes_of(parameters: Any) -> tuple[str, ...]:
-    """Return the notes of a parameter set and of its nested sets, for example about tables, measured lines and fits."""
+    """Return the notes of a parameter set, or of a list of them, and of all nested sets, for example about tables."""
     notes: tuple[str, ...] = ()
     if isinstance(parameters, list | tuple):
         return tuple(note for part in parameters for note in notes_of(part))
@@ -275,7 +280,7 @@ class Block(Generic[P]):
         return case
 
     def part(self, index: int, realisation: int) -> Block[P]:
-        """Return the block of one case in one realisation."""
+        """Return the block of one case in one realisation. `realisation` is one of the `realisations` of this block."""
         columns = {path: column[index : index + 1] for path, column in self.columns.items()}
         return Block(self.parameters, columns, 1, (realisation,), self.seed, self.outputs, self.accuracy)
 

@@ -32,7 +32,7 @@ def entries_of(axis: Mapping[str, Any]) -> dict[tuple[str, ...], list[Any]]:
     """Return the parameters inside the values of a stored axis, such as the radius of each indenter on an axis.
 
     The keys are the paths of the parameters in the campaign. Each list has one element for each value of the axis: a
-    number, a text, or None if the value lacks the parameter.
+    number, a text, or None if the value lacks the parameter. If the values are numbers or texts, the result is empty.
     """
     path = tuple(axis["path"].split("."))
     each = [dict(_leaves(value, path)) if isinstance(value, dict) else {} for value in axis["values"]]

@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import random_stream
 from mdr_dask.models.base import Block, Result, Status
 
-#: Time in s after which the alarm signal SIGALRM is sent to this process, or None for no limit. A process that sets a
-#: limit must also set a handler that raises TimeoutError, as `mdr_dask.execute.children` does.
+#: Longest time in s for the solution of one case, or None for no limit. After this time, the alarm signal SIGALRM is
+#: sent to this process. A process that sets a limit must also set a handler that raises TimeoutError, as
+#: `mdr_dask.execute.children` does.
 time_limit: float | None = None
 
 #: Folder of the package mdr_dask.
@@ -85,15 +86,15 @@ def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
 def is_interrupt(error: BaseException) -> bool:
     """Return whether an exception comes from Ctrl-C.
 
-    Only the main thread receives Ctrl-C, and only in a process that does not ignore SIGINT. Any other KeyboardInterrupt
-    is raised by the user's function.
+    Only the main thread receives Ctrl-C, and only in a process that does not ignore SIGINT. Every KeyboardInterrupt in
+    such a thread counts as Ctrl-C. Any other KeyboardInterrupt was raised by the user's function.
     """
     is_main = threading.current_thread() is threading.main_thread()
     return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 
 
 def reason(error: BaseException) -> str:
-    """Return the type and the text of an exception, as the reason why a case failed."""
+    """Return the type and, if there is one, the text of an exception, as the reason why a case failed."""
     try:
         text = str(error)
     except Exception:  # the method that returns the text of the exception may itself fail
@@ -127,7 +128,7 @@ def _output(name: str, outputs: Any) -> NDArray[np.float64]:
 def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
     """Return an output as an array of floating-point numbers.
 
-    Raise ValueError if the output contains, for example, True, a text or a quantity with a unit.
+    Raise ValueError if the output contains, for example, True, a text, a masked number or a quantity with a unit.
     """
     if type(value) is float:
         return np.asarray(value)

@@ -40,7 +40,7 @@ class Line(NamedTuple):
 
 
 def further(count: int) -> str:
-    """Return a text such as `` (and in 2 more lines)`` for a problem in 3 lines."""
+    """Return a text such as `` (and in 2 more lines)`` for a problem in 3 lines. For one line, the text is empty."""
     return f" (and in {count - 1} more line{'s' if count > 2 else ''})" if count > 1 else ""
 
 
@@ -49,7 +49,8 @@ class Grid:
     """The cells of a text as an array, with masks of the filled cells, of the numbers and of the words.
 
     `length` contains the number of cells of each line in the text. In `cells`, short lines are filled up with empty
-    cells. A word is a filled cell that is neither a number nor a mark of a missing number.
+    cells. Columns at the right end that are empty in all lines are left out and not counted. A word is a filled cell
+    that is neither a number nor a mark of a missing number.
     """
 
     source: str
@@ -107,9 +108,10 @@ def _lines(text: str) -> Iterator[tuple[Line, str]]:
 def separator_of(lines: Sequence[str]) -> str:
     """Return the separator that splits the lines into the largest share of numbers.
 
-    A line counts only if it is split into several cells, and at least half of them are numbers. Lines split by commas
-    or blanks count half, because commas also occur inside numbers, and blanks also occur before units. If no separator
-    splits a line into numbers, return the separator, apart from blanks, that occurs in the largest number of lines.
+    A line counts only if at least two of its filled cells, and at least half of them, are numbers. Lines split by
+    commas or blanks count half, because commas also occur inside numbers, and blanks also occur before units. If no
+    line counts, return the separator, apart from blanks, that occurs in the largest number of lines, or a comma if
+    there is none.
     """
 
     def share(line: str, mark: str) -> float:
@@ -137,7 +139,10 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def are_units(row: Sequence[str]) -> bool:
-    """Return whether at least half of the filled cells of a line are units, or all are in square brackets."""
+    """Return whether at least half of the filled cells of a line are units, or all are in square brackets.
+
+    Cells such as ``-`` or ``1``, which stand for pure numbers, are ignored.
+    """
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
     # a text such as "10 mm" is a value and not a unit, but "10^3 um^3" is a unit
     texts = [text for text in filled if re.match(r"(?!\d)|10\s*[\^⁰¹²³⁴-⁹]|1e", text)]

@@ -19,7 +19,7 @@ from mdr_dask.tables.numerals import floats, is_number
 from mdr_dask.tables.sheet import TEMPERATURE, Sheet, read_sheet
 from mdr_dask.units import example_unit, scaled
 
-#: Measured values count as equal up to this relative difference, because instruments print only three digits.
+#: Measured values count as equal up to this relative difference, because some instruments print only three digits.
 AGREE = 0.01
 #: A column name that stands for a common logarithm: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
@@ -36,8 +36,9 @@ class Meaning(NamedTuple):
 class Read(dict[str, FloatArray]):
     """The columns that were read from a table, in SI, indexed by `Column.name`.
 
-    `headings` contains the name of each column as written in the table. `remark` names the columns and lines of the
-    table that were not used. `unused` maps the name of each unused column to its unit and its numbers.
+    `headings` contains the name of each column as written in the table. `lines` contains the line of each row. `remark`
+    names the columns that were found only by their unit, and the columns and lines of the table that were not used.
+    `unused` maps the name of each unused column to its unit and its numbers.
     """
 
     headings: Mapping[str, str] = {}
@@ -46,7 +47,10 @@ class Read(dict[str, FloatArray]):
     unused: Mapping[str, tuple[str, FloatArray]] = {}
 
     def leave_out_incomplete(self) -> None:
-        """Remove the rows in which a number is missing, and state the number of removed rows in `remark`."""
+        """Remove the rows in which a number is missing, and state the number of removed rows in `remark`.
+
+        The columns in `unused` keep all rows.
+        """
         known = np.isfinite(np.array([*self.values()])).all(axis=0)
         if known.all():
             return
@@ -65,10 +69,11 @@ def read_table(
 ) -> Read:
     """Read the requested columns of a table in SI, each of shape (rows,).
 
-    A table without names must have its columns in the order of `columns`. If `allow_missing` is true, entries without
-    a digit become NaN. The message of a DataError contains at most one problem of each column. `ways` contains groups
-    of column names, and the table must contain all columns of at least one group. The first complete group is read, and
-    columns that belong only to other groups are not used.
+    A table without names must have its columns in the order of `columns`. The result lacks an optional column that the
+    table does not have. If `allow_missing` is true, entries without a digit become NaN. The message of a DataError
+    contains at most one problem of each column. `ways` contains groups of column names, and the table must contain all
+    columns of at least one group. The first complete group is read, and columns that belong only to other groups are
+    not used.
     """
     return read_columns(read_sheet(text, source), columns, allow_missing, ways)
 
@@ -153,7 +158,10 @@ def _found_by_unit(sheet: Sheet, meanings: Sequence[Meaning], columns: Sequence[
 
 
 def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -> tuple[Read, list[str]]:
-    """Return the columns of the sheet that mean a `Column`, converted to SI, and messages about their problems."""
+    """Return the columns of the sheet that mean a `Column`, converted to SI, and messages about their problems.
+
+    If two columns of the sheet mean the same `Column`, the first is used. If they disagree, there is a message.
+    """
     read, problems, taken = Read(), [], {}
     for place, (column, written, is_logarithm) in enumerate(meanings):
         if column is None:
@@ -183,7 +191,10 @@ def _converted(sheet: Sheet, meanings: Sequence[Meaning], allow_missing: bool) -
 
 
 def _unit(written: str, column: Column) -> str:
-    """Return the unit of a column, or an empty text for pure numbers. Raise ValueError for a wrong or missing unit."""
+    """Return the unit of a column, or an empty text for pure numbers without a unit such as ``%``.
+
+    Raise ValueError for a wrong or missing unit.
+    """
     unit = written or column.given_unit
     if unit in ("-", "1") and column.unit == "1":
         return ""

@@ -40,7 +40,10 @@ def decimal_marks(texts: Sequence[str]) -> str:
 
 
 def decimal_mark(texts: Sequence[str]) -> str:
-    """Return the decimal mark of some numbers, or an empty text if some have a decimal point and others a comma."""
+    """Return the decimal mark of some numbers, or an empty text if some have a decimal point and others a comma.
+
+    The text is also empty if both characters occur and each of them could be the decimal mark of all numbers.
+    """
     count = {mark: sum(mark in text for text in texts) for mark in ".,"}
     possible = decimal_marks(texts)
     if len(possible) == 2 and all(count.values()):

@@ -83,9 +83,10 @@ def read_head(text: str) -> Sheet:
 
 
 def _numeric_columns(grid: Grid) -> BoolArray:
-    """Return a mask of the columns with numbers. Its length is the most frequent number of cells in lines with numbers.
+    """Return a mask of the columns with numbers, for the most frequent number of cells in lines with numbers.
 
-    A column is numeric if at least half of the lines with this number of cells have a number in this column.
+    Lines with more words than numbers are ignored, unless all lines are of this kind. A column is numeric if at least
+    half of the lines with the most frequent number of cells have a number in this column.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # every line has more words than numbers
@@ -99,9 +100,9 @@ def _numeric_columns(grid: Grid) -> BoolArray:
 def _lines_of_numbers(grid: Grid, numeric: BoolArray) -> BoolArray:
     """Return a mask of the lines with numbers.
 
-    A line contains numbers if at least half of its filled cells in numeric columns are numbers or marks of missing
-    numbers. A line that begins with a word is text if the word is in a numeric column, or if less than half of the
-    columns are filled.
+    Only cells in numeric columns count. A line contains numbers if it has at least one number and at most half of its
+    filled cells are words, or if its filled cells are all marks of missing numbers. A line that begins with a word is
+    text if the word is in a numeric column, or if less than half of the columns are filled.
     """
     width = numeric.size
     numeric = np.append(numeric, np.zeros(grid.cells.shape[1] - width, dtype=bool))
@@ -130,9 +131,9 @@ def _head(grid: Grid, data: BoolArray, width: int) -> _Head:
 
     `data` is a mask of the lines of numbers, and `width` is the number of cells of most of these lines. A candidate is
     a line above the numbers with `width` cells. Without candidates, the last line above the numbers contains the names.
-    If a candidate below the first consists of units, the candidate above it contains the names. If only the first of
-    several candidates consists of units, the last candidate contains the names. The candidate that remains above the
-    names contains labels of columns.
+    If a candidate below the first consists of units, the candidate above it contains the names. If not, the last
+    candidate contains the names; if there are exactly two candidates, the first may then consist of units. The next
+    remaining candidate above the names contains labels of columns.
     """
     full = np.flatnonzero(data & (grid.length == width))
     if not full.size:
@@ -183,7 +184,7 @@ def _body(
     """Return the indices of the lines of numbers, the temperature stated above each line, and a remark.
 
     The remark lists the lines below the numbers. DataError is raised for text between two lines of numbers, unless this
-    text repeats the line of names.
+    text repeats the line of names, and for a line below the numbers whose first filled cell is a number.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []
@@ -239,7 +240,11 @@ def _with_temperatures(sheet: Sheet, temperatures: Sequence[Temperature | None])
 
 
 def _require_even(grid: Grid, rows: Sequence[int], width: int, numeric: BoolArray, first: Line) -> None:
-    """Raise DataError if a line ends before the last column of numbers, or has more cells than the table has names."""
+    """Raise DataError if a line ends before the last column of numbers, or has more than `width` cells.
+
+    `width` is the number of names or, without names, of the cells in most lines of numbers. If the cells are separated
+    by blanks and there are more names than cells in these lines, every line must have `width` cells.
+    """
     blanks = width > numeric.size and grid.separator == BLANKS  # a name that contains a blank became two cells
     wrong = [
         row
@@ -279,7 +284,10 @@ def _with_points(grid: Grid, rows: Sequence[int]) -> Cells:
 
 
 def _groups(sheet: Sheet) -> list[list[int]]:
-    """Return the columns of each group if groups of columns with equal names and units stand side by side, or []."""
+    """Return the columns of each group if groups with equal names and units stand side by side, or [].
+
+    A group has at least two columns. Columns without names and values are ignored.
+    """
     places = [place for place, name in enumerate(sheet.names) if name or sheet.cells[:, place].any()]
     known = [(plain(sheet.names[place]), sheet.units[place]) for place in places]
     for size in range(2, len(known) // 2 + 1):
@@ -291,8 +299,8 @@ def _groups(sheet: Sheet) -> list[list[int]]:
 def _joined(grid: Grid, sheet: Sheet, head: _Head, groups: Sequence[Sequence[int]]) -> Sheet:
     """Join groups of columns into one group, in which the rows of the second group follow the rows of the first group.
 
-    If the groups have no column of temperatures, the temperature in the label above each group becomes a further
-    column.
+    Empty rows of a group are left out. If the groups have no column of temperatures, the temperature in the label above
+    each group becomes a further column. DataError is raised if a label states no temperature.
     """
     pairs = [(line, row[places]) for places in groups for line, row in zip(sheet.lines, sheet.cells, strict=True)]
     filled = [row.any() for _, row in pairs]

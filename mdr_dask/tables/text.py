@@ -65,7 +65,8 @@ def _of_workbook(cell: object, kinds: set[str]) -> str:
     """Return a cell as text on one line, with a decimal point instead of a decimal comma.
 
     `kinds` contains the decimal marks of all texts in the workbook that have only one possible mark. A text such as
-    ``3,158`` has two possible marks, and is read as a number only if `kinds` contains exactly one mark.
+    ``3,158`` has two possible marks, and is read as a number only if `kinds` contains exactly one mark. If not, a
+    remark is appended, so that the cell counts as a text.
     """
     text = " ".join(str(cell).split())
     kind = decimal_marks([text]) if isinstance(cell, str) else ""

@@ -81,8 +81,8 @@ def test_bad_line_is_a_status() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("velocity_change", 0.0, "expected a larger velocity_change"),
-        ("velocity_change", 1e-17, "expected a larger velocity_change"),
+        ("velocity_change", 0.0, "expected a velocity_change farther from 0"),
+        ("velocity_change", 1e-17, "expected a velocity_change farther from 0"),
         ("normal_force", -1.0, "the load must be positive and finite, got -1"),
         ("normal_force", 1e300, "check the units"),
     ],

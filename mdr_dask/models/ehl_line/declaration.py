@@ -172,8 +172,8 @@ OUTPUTS = (
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     """Return the dimensionless parameters W (load), U (speed) and G (material).
 
-    If the user does not give W, U or G, the missing number is computed from quantities with units. ``lookup(name)``
-    returns the values of the parameter `name`, or None if the user does not give this parameter.
+    If the user does not give one of these numbers, it is computed from quantities with units. ``lookup(name)`` returns
+    the values of the parameter `name`, or None if the user does not give this parameter.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")

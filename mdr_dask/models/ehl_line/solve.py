@@ -59,7 +59,10 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(block: Block[EhlLineParameters], index: int, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return, for each requested output, a function that computes the output from the solution on one grid."""
+    """Return functions that compute film, pressure, spike position and traction from the solution on one grid.
+
+    The keys are the names of the outputs. Only requested outputs are included.
+    """
     case, film = block.case(index), square_of_half_width(W)
     p0 = 2 * case.contact_modulus * float(np.sqrt(W / (2 * np.pi)))
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
@@ -78,7 +81,11 @@ def _readings(block: Block[EhlLineParameters], index: int, W: float, contact: Li
 def _estimates(
     block: Block[EhlLineParameters], index: int, W: float, solution: LineSolution, read: dict[str, Estimate]
 ) -> dict[str, Estimate]:
-    """Return the requested outputs of a case, with their errors. `read` contains the results of `_readings`."""
+    """Return the requested outputs of a case, except those from formulas, with their errors.
+
+    `read` contains the outputs that the functions of `_readings` compute. A film thickness in m is NaN if the campaign
+    does not give the radius.
+    """
     found, radius = dict(read), block.case(index).radius
     for name, film in (("central_film", solution.central_film), ("minimum_film", solution.minimum_film)):
         found[name] = film.scaled(square_of_half_width(W))
@@ -91,8 +98,9 @@ def _estimates(
 def _spike(solution: LineSolution) -> Estimate:
     """Return the position of the spike and its error.
 
-    Two numbers are added: the width of the cell around the spike, and the larger of the last change between two grids
-    and half of the change before it. With fewer than three grids, the error is infinite.
+    The error is the sum of two numbers. The first is the width of the cell around the spike. The second is the change
+    of the position from the second finest to the finest grid, or, if larger, half of the change one grid earlier.
+    The error is infinite if there are fewer than three grids, or if one of the two finest grids has no spike.
     """
     places = np.array([grid.spike for grid in solution.grids[-3:]])
     moves = np.abs(np.diff(places))

@@ -82,7 +82,7 @@ def profile_columns(file: NamedFile) -> Read:
 
 
 Indenter = Annotated[Parabola | Cone | Power | Table, Field(discriminator="shape")]
-#: For each shape, the parameter that states the size of the body in a dimensional campaign.
+#: For each shape except a table, the parameter that states the size of the body in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
 
 

@@ -52,7 +52,10 @@ def indenters(block: Block[FrettingWear]) -> list[Indenter]:
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of the power-law body of every case. Both numbers are NaN for any other body."""
+    """Return coefficient and exponent of the power-law body of every case.
+
+    Both numbers are NaN for a table. The coefficient is also NaN if the campaign does not give the size of the body.
+    """
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Table) else one.power_law() for one in indenters(block)]
@@ -89,7 +92,10 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Return the dimensionless numbers and the units of every case, and messages about cases that cannot be solved."""
+    """Return the dimensionless numbers and the units of every case, and messages about cases that cannot be solved.
+
+    The key of a message is (index of the case, position of the realisation in the block).
+    """
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
     for case, position in np.argwhere(numbers.level >= 1):
@@ -154,7 +160,8 @@ def _first_contact(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the contact radius a0 and the indentation depth d0 before wear, in m, for every case.
 
-    If a0 cannot be computed, for example because a table ends at a radius below a0, a0 is NaN and a message is added.
+    If a0 cannot be computed from a table, for example because the table ends at a radius below a0, a0 is NaN, and a
+    message is added to `messages` for every realisation.
     """
     from mdr_dask.physics.mdr import power_law_contact as contact
 
@@ -174,7 +181,10 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Return the contact before wear at an indentation depth. Raise ValueError if the body is a power law."""
+    """Return the profile of a table, with the contact radius before wear at an indentation depth in m.
+
+    Raise ValueError if the body is a power law, or if the contact reaches beyond the table.
+    """
     if not isinstance(indenter, Table):
         raise ValueError("power laws and tables of profiles cannot be mixed along one axis")
     return _pressed_table(indenter.file, depth)

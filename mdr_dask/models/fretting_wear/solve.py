@@ -1,7 +1,7 @@
 """Solution of a block of cases of fretting wear.
 
-With the exact rule and no load history, cases with the same body and stick radius share one solution. This solution
-gives the results at all numbers of cycles.
+With the exact rule and no load history, cases with the same body, stick radius and `hold` share one solution. This
+solution gives the results at all numbers of cycles.
 """
 
 from __future__ import annotations
@@ -114,9 +114,9 @@ def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
 
 
 def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
-    """Multiply outputs by the units of length, height and force of each case.
+    """Multiply the outputs of each case, and their errors, by their units. The arrays in `values` are changed.
 
-    In a dimensionless campaign, the units are 1.
+    The units follow from those of length, height and force. In a dimensionless campaign, they are 1.
     """
     units = {
         "contact_radius": numbers.length,
@@ -154,8 +154,8 @@ def _solve_plain(
 ) -> int:
     """Compute the cases of a block together, by `rules.limit_cases` and `rules.fast_cases`.
 
-    `good` is the mask of the cases and realisations to compute. Return the number of distinct cases. Each distinct case
-    is computed only once.
+    `good` is the mask of the cases and realisations to compute. Write the results to `values`, and return the number of
+    distinct cases. Each distinct case is computed only once.
     """
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
@@ -215,7 +215,7 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Checked], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution.
+    """Return one output of a solution, or the error of an output.
 
     An output ``block_...`` has one row for each block of the load history. Any other output belongs to the last block.
     """

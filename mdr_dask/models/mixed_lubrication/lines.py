@@ -69,7 +69,7 @@ class GeneratedPair:
         return float(np.sqrt(sum(squares)))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
-        """Return the least-squares splines of both lines, shape (2, points).
+        """Return the coefficients of the least-squares splines of both lines, shape (2, points).
 
         The random phases are drawn in the order of the wavelengths, beginning with the longest wavelength. Longer waves
         therefore stay the same if shorter waves are added.
@@ -139,9 +139,10 @@ class MeasuredPair:
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
-        """Return the splines of both lines, shape (2, points).
+        """Return the coefficients of the splines of both lines, shape (2, points).
 
-        The splines go through every second point if `points` is half of the largest number of points.
+        On the fine grid, the splines go through all points, and on the coarse grid through every second point.
+
         During one revolution at the mean velocity, with a slide-roll ratio S, the contact travels (1 + S/2) times the
         length of line 1, and (1 - S/2) times the length of line 2. The contact thus passes some points more often than
         others. Because both lines begin at random points, means over realisations are nevertheless unbiased.

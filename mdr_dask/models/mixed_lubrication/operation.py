@@ -45,12 +45,12 @@ class Operation:
 
     @property
     def scale(self) -> float:
-        """Height in m by which the heights of the lines are divided."""
+        """Height in m by which the heights of the lines are divided, or 1 if the lines have heights in m."""
         return self.case.rms_roughness or 1.0
 
     @property
     def strength(self) -> float:
-        """Strength of the boundary layer, divided by `scale`."""
+        """Strength s = pi tau0 / (12 E* h_c) of the boundary layer in 1/m, divided by `scale`."""
         case = self.case
         return float(layer_strength(case.layer_shear_strength, case.contact_modulus, case.layer_thickness)) / self.scale
 

@@ -56,7 +56,10 @@ class Revolution:
 
 
 def revolve(operation: Operation, lines: FloatArray) -> Revolution:
-    """Find the intimate contact during one revolution. `lines` are the splines of both lines, shape (2, points)."""
+    """Find the intimate contact during one revolution.
+
+    `lines` contains the spline coefficients of both lines, shape (2, points).
+    """
     case, points = operation.case, lines.shape[1]
     spacing, creep = operation.source.length / points, case.slide_roll_ratio
     width, stride = operation.width / spacing, 1

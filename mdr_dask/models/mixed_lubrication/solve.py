@@ -33,7 +33,9 @@ _SHARED = {
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
-    """Solve the cases of a block. One realisation is one revolution of the rollers with random lines.
+    """Solve the cases of a block. One realisation is one revolution of the rollers.
+
+    The lines have random phases, or they are measured lines that begin at random points.
 
     In each realisation, cases that differ only in load, speed, temperature, rms height or boundary layer have the same
     lines, apart from the scale of the heights.
@@ -153,9 +155,9 @@ def _warnings(operation: Operation, outputs: Collection[str]) -> Iterator[str]:
 def operations(block: Block[MixedLubrication]) -> float:
     """Return the approximate number of operations of a block. Only the two coarsest grids of every case are counted.
 
-    Each point needs about 40 operations to make the lines, and 10 operations in each case. With sliding, a case needs
-    at least `WINDOWS` times as many operations, because each point lies in several windows. An EHL film needs about ten
-    solutions to find the load shares.
+    Each point needs about 40 operations to make the lines, and 10 operations in each case. With sliding, a case is
+    assumed to need `WINDOWS` times as many operations, because each point lies in several windows. An EHL film needs
+    about ten solutions to find the load shares.
     """
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     points_of = np.empty(block.cases)

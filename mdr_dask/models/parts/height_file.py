@@ -63,9 +63,10 @@ class _Grid(NamedTuple):
 def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]:
     """Return the map in a file, and remarks on how the file was read.
 
-    The file is a text, an npy file, or a file that SurfaceTopography can read. Each row of a text or npy file contains
-    the heights along x at one y. Each row of a text may instead contain the coordinates x, y and z of one point. In the
-    map, missing points are NaN. `units` are the units and spacings that the user states.
+    The file is a text, a workbook, an npy file, or a file that SurfaceTopography can read. Each row of a text, workbook
+    or npy file contains the heights along x at one y. In a text or workbook, each row may instead contain the
+    coordinates x, y and z of one point. A text may also be a grid file of Surfer or ESRI. In the map, missing points
+    are NaN. `units` are the units and spacings that the user states.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -82,7 +83,7 @@ def read_map(file: DataFile, units: Units) -> tuple[SurfaceMap, tuple[str, ...]]
 
 
 def read_scan(file: DataFile, units: Units) -> Scan:
-    """Return the line scan in a file. Missing heights are interpolated.
+    """Return the line scan in a file. Rows without a position are left out. Missing heights are interpolated.
 
     The file is a table, or a file that SurfaceTopography can read. `units` are the units and the spacing that the user
     states.
@@ -139,7 +140,8 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     Unit and spacings are taken from the file or from the options of the user. If the unit of the positions is missing
     and the user states the spacing, the unit is taken as the power of ten of a metre that fits the spacing. For
     positions 0, 0.5, 1 ... and a spacing of 0.5 um, the unit is 1e-6 m. Positions 0, 1, 2 ... without a unit are taken
-    as indices of points. Raise DataError if a unit or the spacing is missing, or if the file contradicts the user.
+    as indices of points. If there is no spacing along y, the spacing along x is used. Raise DataError if a unit or the
+    spacing is missing, or if the file contradicts the user.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -309,7 +311,7 @@ def _stated(file: DataFile, head: list[str], first: str, shape: tuple[int, int])
     A line with a unit or a spacing names a quantity and ends in a unit of length. ``Height [um]`` states the unit of
     the heights. ``Position [mm]``, or the first cell of a table such as ``y [um]``, states the unit of the positions.
     ``Spacing: 2 um`` states a spacing. Gwyddion states the sides of the map instead: ``Width: 10 um`` and
-    ``Height: 10 um``.
+    ``Height: 10 um``. Raise DataError if two lines contradict each other.
     """
     sides = {"width": ("spacing", shape[1]), "height": ("spacing_y", shape[0])}
     corner = re.split(r"[\t;,]", first)[0]
@@ -391,8 +393,9 @@ COORDINATES = (
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: FloatArray) -> tuple[tuple[int, str], ...]:
     """Return the index and the unit of each of the columns x, y and z. Return () if one of these columns is missing.
 
-    If the columns have no names, there must be exactly three columns apart from row numbers: x, y and z, in this order.
-    If the numbers of one of these columns only rise or only fall, the table is a line scan, and () is returned.
+    If the columns have no names, row numbers are ignored, and three other columns are taken as x, y and z in this
+    order. With fewer or more columns, return (). Also return () if the numbers of one of the three columns only rise or
+    only fall, because the table is then a line scan.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)
@@ -436,8 +439,9 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: FloatArray, 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return the positions and the heights of a line scan, both in m, from a table.
 
-    If the columns have no names, the column whose numbers only rise or only fall contains the positions. A single
-    column of numbers contains the heights, whatever text is above the column. The user must then give the spacing.
+    If the columns have no names, the column whose numbers only rise or only fall contains the positions. If there are
+    row numbers as well, the row numbers are ignored. A single column of numbers contains the heights, unless its name
+    is that of the positions. The user must then give the spacing.
     """
     sheet = read_sheet(file.read_text(), file.name)
     columns = (

@@ -96,7 +96,10 @@ class Oscillation(_History):
 
 
 class TableFile(_History):
-    """Velocity and load from a table, interpolated linearly between rows. Two rows with the same time give a jump."""
+    """Velocity and normal force from a table, interpolated linearly between rows, and constant after the last row.
+
+    Two rows with the same time give a jump. Without a column of forces, the force is the parameter `normal_force`.
+    """
 
     shape: Literal["table"]
     file: NamedFile = Field(description='table with the columns "time", "velocity" and, optionally, "force"')
@@ -107,7 +110,7 @@ class TableFile(_History):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note on the columns of the table that are not used."""
+        """Return a note on the columns and lines of the table that are not used."""
         remark = _table(self.file).remark
         return (f"table {self.file.name}: {remark}",) if remark else ()
 
@@ -119,7 +122,8 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
     `velocity` and `force` are the parameters of the sliding body, and `change` is the relative change of the velocity
-    at a jump. The last piece ends at t = infinity. Raise DataError if the protocol contradicts `velocity` or `force`.
+    at a jump. The last piece ends at t = infinity. Raise DataError if the protocol contradicts `velocity` or `force`,
+    or if its table is wrong.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

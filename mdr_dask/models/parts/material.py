@@ -125,7 +125,7 @@ class Material(Parameters):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on the error of a fitted Prony series, and on a temperature outside a table."""
+        """Return notes on the error of a fitted Prony series, on b_T, and on a temperature outside a table."""
         return (*fit_notes(self), *_table_notes(self))
 
 
@@ -157,7 +157,10 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return b_T at the material's temperature. The moduli of a table are divided by this factor."""
+    """Return b_T at the material's temperature. The moduli of a table are divided by this factor.
+
+    Return 1 if the material has no table, or if the temperature of the material or of the table is not given.
+    """
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
         return 1.0

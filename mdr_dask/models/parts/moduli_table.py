@@ -79,7 +79,7 @@ class ModulusTable(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on unused columns, and a note if the table does not say that its moduli are shear moduli."""
+        """Return notes on unused columns and rows, and on moduli that are assumed to be shear moduli."""
         table = _table(self)
         heading = table.headings["storage modulus"]
         notes = [table.remark] if table.remark else []
@@ -95,7 +95,7 @@ class Moduli:
 
     `temperature` is the temperature of the curve in K, and `measured` are the lowest and the highest temperature of the
     table in K. Without a stated temperature, `temperature` and `measured` are None. `superposed` describes how the
-    curves of several temperatures were superposed.
+    curves of several temperatures were superposed, and is empty if they were not.
     """
 
     omega: FloatArray
@@ -110,7 +110,8 @@ class Moduli:
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the shear moduli of a table at one temperature.
 
-    The curves of several temperatures are superposed, unless the user chooses one temperature.
+    The curves of several temperatures are superposed, unless the user chooses one temperature. Raise DataError if the
+    user gives neither a temperature nor a way to superpose the curves.
     """
     found = _as_measured(chosen, law)
     divisor = 1.0 if chosen.poisson_ratio is None else 2 * (1 + chosen.poisson_ratio)
@@ -157,7 +158,7 @@ def _near(temperature: FloatArray, wanted: float) -> FloatArray:
 
 
 def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return, for every row, the index of its temperature, and then the distinct temperatures in ascending order."""
+    """Return, for every row, the index of its curve, and the mean temperature of each curve in ascending order."""
     order = np.argsort(temperature, kind="stable")
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
@@ -188,7 +189,8 @@ def _vertical(chosen: ModulusTable) -> str:
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
     """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text.
 
-    The text states log10 a_T at the lowest and the highest temperature.
+    The text states log10 a_T at the lowest and the highest temperature, and the ranges of temperature in which shift
+    factors are not determined. Raise DataError if the reference temperature lies outside the table.
     """
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
@@ -217,7 +219,10 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between the shift factors of the curves and of `law`."""
+    """Return a text with the largest difference between the shift factors of the curves and of `law`.
+
+    If `law` does not apply at all temperatures, the text gives the reason. Without a law, the text is empty.
+    """
     if law is None:
         return ""
     try:
@@ -241,7 +246,7 @@ def moduli_of(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray
 
 
 def _table(chosen: ModulusTable) -> Read:
-    """Return the columns of the file, including storage and loss modulus."""
+    """Return the columns of the file, including storage and loss modulus. Incomplete rows are left out."""
     name, content = chosen.file.name, chosen.file.read_text()
 
     def modulus(kind: str, *other_names: str) -> Column:

@@ -11,14 +11,14 @@ from mdr_dask.physics.refine import SAFETY
 from mdr_dask.tables import AGREE
 from mdr_dask.units import shown
 
-OUTER = 2  # at most so many rows (or columns) at each edge of a table contain positions or row numbers
+OUTER = 2  # at most this many rows (or columns) at each edge of a table contain positions or row numbers
 FEW_LEVELS = 10  # largest number of distinct heights of a designed surface such as a grating, chosen by trial
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
     """Return, for each row of a table, whether its numbers only rise or only fall, as positions and row numbers do.
 
-    More than half of the differences between neighbours must be finite and not 0.
+    Neighbours may be equal or NaN, but more than half of the differences between neighbours must be finite and not 0.
     """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
@@ -31,7 +31,8 @@ def without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[float | None,
 
     Return the heights, the steps of the positions along x and y, and remarks that name the removed rows and columns.
     The step along x is None if the table has no positions along x. The same applies to y. A table with fewer than
-    ``4 * OUTER`` rows or columns is returned unchanged.
+    ``4 * OUTER`` rows or columns is returned unchanged. Raise DataError if the positions do not lie on one regular
+    grid.
     """
     if min(rows.shape) < 4 * OUTER:
         return rows, (None, None), ()
@@ -69,9 +70,10 @@ def is_numbered(line: FloatArray) -> bool:
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the common step of the positions in the given rows or columns. Raise DataError if the steps differ.
+    """Return the common step of the positions in the given rows or columns.
 
-    Rows of consecutive integers are row numbers and are ignored. Return None if no other rows are left.
+    Lines of consecutive integers are row numbers and are ignored. Return None if no other lines are left. Raise
+    DataError if the steps differ, or if positions do not lie on a regular grid.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > AGREE * steps[0] for step in steps):
@@ -110,8 +112,8 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
     """Arrange points, given in any order, in rows of heights. Return the rows and the steps along x and y.
 
-    Grid points without a height become NaN. Raise DataError if two points have the same place, or if fewer than a
-    quarter of the grid points are given.
+    Grid points without a height become NaN. Raise DataError if the points do not lie on a regular grid, if two points
+    have the same place, or if fewer than a quarter of the grid points are given.
     """
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1

@@ -1,6 +1,7 @@
 """The four kinds of lines: generated lines, lines with the spectrum of a surface, measured lines, and smooth lines.
 
-Heights are divided by the rms height of the line. Positions are divided by the length of the line.
+Heights are divided by a unit of height, which is the rms height of the line unless a method `height` says otherwise.
+Positions are divided by the length of the line.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ class SlidingProblems:
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
         """Yield the setting and the case indices of each group of solvable cases.
 
-        All cases of a group have the same value in each of the `columns`.
+        All cases of a group have the same setting, and the same value in each of the `columns`.
         """
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
@@ -160,7 +160,7 @@ def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, len
 
 
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
-    """Add a message for every case with a dimensionless number that may overflow or underflow."""
+    """Add a message to `faults` for every case with a dimensionless number that is too large or too small."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < MOST))):
             between = f"expected {name} between {LEAST:g} and {MOST:g}, got {column[j]:.9g}"
@@ -181,7 +181,8 @@ def _lines(
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
     """Return the distinct rough lines, and for every case the index of its line, the length L and the rms height h.
 
-    For a smooth line, L is returned in place of h. A line that cannot be made is None.
+    For a line without roughness, L is returned in place of h. A line that cannot be made is None, and `faults` gets a
+    message for each of its cases.
     """
     length, height = block.numbers("length"), block.numbers("rms_roughness")
     flat = height == 0
@@ -220,6 +221,7 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
 
     Also return the Prony terms of each distinct solid, and for every case the index of its solid. Prony terms consist
     of moduli divided by the static modulus, and of relaxation times in s. The Prony terms of a Kelvin solid are None.
+    If a solid cannot be made, its Prony terms are also None, and `faults` gets a message for each of its cases.
     """
     static, viscosity = block.numbers("shear_modulus"), block.numbers("relaxation_time")
     materials, which = each(block, "material")

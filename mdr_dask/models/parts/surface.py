@@ -68,13 +68,16 @@ class Surface(Parameters):
         return self
 
     def without_spectrum(self) -> tuple[str, ...]:
-        """Return, for each file that has no isotropic spectrum, a sentence with the reason."""
+        """Return the reason for each map that is not isotropic, unless the user gives the direction of sliding."""
         if self.map is None:
             return ()
         return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on the wavelength range, the rms height and the rms gradient of each spectrum."""
+        """Return notes on the wavelengths, the rms height and the rms gradient of each spectrum, and on its file.
+
+        Return () for a profile, which has its own notes.
+        """
         if self.profile is not None:
             return ()
         spectra = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
@@ -113,10 +116,10 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return a copy of the parameters `value`, with ``hurst: None`` added if they contain a measured surface.
+    """Add ``hurst: None`` to a copy of the parameters `value` if they contain a measured surface but no `hurst`.
 
-    `surface` is the name of the parameter that contains the surface. If `value` already contains `hurst`, nothing is
-    added. The default of `hurst` is for generated roughness only.
+    `surface` is the name of the parameter that contains the surface. Without a measured surface, `value` is returned
+    unchanged, because the default of `hurst` is for generated roughness.
     """
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value

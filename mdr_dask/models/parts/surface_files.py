@@ -136,7 +136,10 @@ class MapFiles(HeightFiles):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with column names of a spectrum. A single name must have two letters or more."""
+    """Return whether a text begins with a table that has column names of a spectrum.
+
+    If only one column has such a name, the name must have two letters or more.
+    """
     try:
         sheet = read_head(text)
     except DataError:

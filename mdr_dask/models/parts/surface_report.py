@@ -49,19 +49,22 @@ UNITS = {
 """Columns of a report and their units. A value is NaN if a file does not determine the quantity.
 
 * Sq and Sa: rms height and mean absolute height of the levelled map. Pq: rms height of the levelled profile. Sq, Sa and
-Pq are computed without a window. Gradient, slopes and anisotropy are computed from the windowed heights.
+Pq are computed without a window. Slopes, anisotropy and the gradient of a map are computed from the windowed heights.
+The gradient of any other file is computed from its spectrum C2D.
 * hurst, rolloff and cutoff: Hurst exponent, longest and shortest wavelength of the fitted power law, each with the ends
 of its 95 % confidence interval (`_low` and `_high`).
-* resolution: shortest wavelength that is not only noise. length: longest wavelength of a map, length of a profile.
+* resolution: shortest wavelength that is not only noise, or shortest wavelength of the spectrum if no noise was found.
+length: longest wavelength of a map, length of a profile.
 """
 
 
 class FileReport(NamedTuple):
     """Report on one file.
 
-    `row` contains a value for each name in `UNITS`. `bins` contains wave numbers, C2D and the standard error of
-    log C2D. `cuts` contains the wave numbers and the power spectrum, in m^3, of straight profiles. The key is "x" or
-    "y", the direction of the profiles. `law` is the fitted power law, or None if no power law fits.
+    `row` contains a value for each name in `UNITS`. `bins` contains wave numbers, C2D and the standard error of log
+    C2D. `cuts` contains the wave numbers and the power spectrum, in m^3, of straight profiles. The key is "x" or "y",
+    the direction of the profiles. A table of a spectrum has no `cuts`. `law` is the fitted power law, or None if no
+    power law fits, or if a map is anisotropic and the user gives no direction.
     """
 
     file: DataFile

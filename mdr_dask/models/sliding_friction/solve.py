@@ -33,7 +33,10 @@ OUTPUTS = dict(
 
 
 def compute(block: Block[SlidingFriction]) -> Result:
-    """Solve the cases of a block. In each realisation, cases with equal dimensionless numbers are solved only once."""
+    """Solve the cases of a block. In each realisation, cases with equal dimensionless numbers are solved only once.
+
+    Cases on a line that is not random are solved only once for all realisations.
+    """
     shape = (block.cases, len(block.realisations))
     result = Result(MODEL.empty_arrays(block, shape), np.full(shape, Status.FAILED, np.int8))
     problems = sliding_problems(block)
@@ -56,14 +59,14 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield groups of cases with equal setting and grid: the setting, one case, and the indices of all cases."""
+    """Yield groups of cases with equal setting, grid and scheme: the setting, one case, and all case indices."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
 
 
 class _Group:
-    """Cases with the same line, solid and grid. Equal cases are solved only once."""
+    """Cases with the same setting, grid and scheme. Equal cases are solved only once."""
 
     def __init__(
         self,
@@ -117,7 +120,10 @@ class _Group:
     def _messages(
         self, steady: Steady, values: dict[str, FloatArray], errors: dict[str, FloatArray]
     ) -> Iterator[tuple[int, str]]:
-        """Yield messages about failures, outputs that miss the accuracy, and cases outside the tested range."""
+        """Yield messages about failures, outputs that miss the accuracy, and cases outside the tested range.
+
+        The accuracy is checked only with ``oversampling: auto``.
+        """
         status = steady.status[self.which]
         for k in np.flatnonzero(status != Outcome.CONVERGED):
             yield int(k), Outcome(int(status[k])).sentence

@@ -123,7 +123,10 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
 
 
 def time_notes(sets: Sequence[VelocityJump]) -> tuple[str, ...]:
-    """Return a note with tau in s, the longest relaxation time of a material, or with the range of tau in a study."""
+    """Return a note with tau in s, the longest relaxation time of a material, or with the range of tau in a study.
+
+    Return () if no case has a `material`, or if no material is valid.
+    """
     units = []
     for one in sets:
         if one.material is not None:
@@ -140,7 +143,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 MODEL = Model(
     name="velocity_jump",
     version=20,
-    summary="friction before, at and after a jump of the sliding velocity at constant load",
+    summary="friction after a jump of the sliding velocity, or during a history of velocity and load",
     parameters=VelocityJump,
     outputs=OUTPUTS,
     compute=deferred(SOLVE, "compute"),

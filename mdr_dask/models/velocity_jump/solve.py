@@ -81,7 +81,7 @@ def compute(block: Block[VelocityJump]) -> Result:
     refuse_immense({"v_2 / v_1": np.where(after == 0, 1, after)}, problems.faults)
     for j in np.flatnonzero(after == 1):
         problems.faults.setdefault(
-            int(j), "expected a larger velocity_change: the velocity stays the same because of rounding"
+            int(j), "expected a velocity_change farther from 0: the velocity stays the same because of rounding"
         )
     groups = list(_groups(block, problems))
     for r, realisation in enumerate(block.realisations):  # all lines of a realisation have the same random phases
@@ -94,7 +94,7 @@ def compute(block: Block[VelocityJump]) -> Result:
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
     """Yield groups of cases.
 
-    A group consists of jumps of plane Kelvin bodies with the same line and grid, or of a single other case.
+    A group consists of jumps of plane Kelvin bodies with the same line, grid and time steps, or of a single other case.
     """
     protocols, which = each(block, "protocol")
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
