@@ -29,7 +29,7 @@ class Factors(NamedTuple):
 
 
 def factorise(matrix: FloatArray) -> Factors | None:
-    """Return the LU factors of a square C-ordered matrix, or None if the matrix is singular or not finite.
+    """Return the `Factors` of a square C-ordered matrix, or None if the matrix is singular or not finite.
 
     The matrix is overwritten.
     """

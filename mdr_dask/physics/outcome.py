@@ -35,7 +35,7 @@ _SENTENCES = {
     Outcome.OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
     Outcome.INVALID: "load, velocity and line must be finite; the load and the Deborah number must also be positive",
     Outcome.TOO_MANY_STEPS: "too many steps were needed",
-    Outcome.SINGULAR: "the linear equations of a step have no solution",
+    Outcome.SINGULAR: "the linear equations of a step have no unique solution",
     Outcome.FILM_COLLAPSED: "the next step would have closed the film",
     Outcome.STEP_TOO_SMALL: "the steps became too small",
     Outcome.UNDER_WAY: "the solution was not finished",

@@ -35,7 +35,10 @@ EPS = float(np.finfo(np.float64).eps)
 """Relative rounding error of floating-point numbers."""
 
 CLOSE = float(np.sqrt(EPS))
-"""Newton's method ends after a relative step below this limit, because the next step would be a rounding error."""
+"""The square root of `EPS`, used as a tolerance and as the step of finite differences.
+
+Newton's method ends after a relative step below this limit, because the next step would be a rounding error.
+"""
 
 
 class Estimate(NamedTuple):
@@ -67,9 +70,9 @@ class Refined(NamedTuple):
     """Results of `refine` for all cases.
 
     `values` contains one array per output, with NaN for cases without a solution. `errors`, shape (outputs, cases),
-    contains absolute errors, or infinity if no estimate is possible. The error of a profile is the largest error along
-    the profile. `met` is True for a case if every requested output meets the accuracy. `level` is the level of the grid
-    on which the case was solved, or the last level that was tried if the case has no solution.
+    contains absolute errors, or infinity if an error was not estimated. The error of a profile is the largest error
+    along the profile. `met` is True for a case if every requested output meets the accuracy. `level` is the level of
+    the grid on which the case was solved, or the last level that was tried if the case has no solution.
     """
 
     values: list[FloatArray]
@@ -101,9 +104,9 @@ def refine(
     solution on the finest grid without a failure is returned instead.
 
     The accuracy of an output is relative to the largest absolute value of the output in the case, or to the entry of
-    the output in `floors` if this entry is larger. If `accuracy` is infinite, the result on the second level is
-    accepted. `order` is the order of convergence of the dominant part of the error, one number or one for each output.
-    Only the first `requested` outputs must meet the accuracy, or all outputs if `requested` is None.
+    the output in `floors` if this entry is larger. If `accuracy` is infinite, the first result on the second or a finer
+    level is accepted. `order` is the order of convergence of the dominant part of the error, one number or one for each
+    output. Only the first `requested` outputs must meet the accuracy, or all outputs if `requested` is None.
 
     If `shared` is True, the largest relative change among the requested outputs of a case is used for all requested
     outputs of this case, because a single output may have the same value on two grids by chance. Outputs that are not

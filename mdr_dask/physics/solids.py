@@ -43,6 +43,7 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
     """Return the standard solid, which has one Prony term. Moduli are in Pa, and the time is in s.
 
     `static_modulus` is the modulus for very slow deformation, and `glass_modulus` the modulus for sudden deformation.
+    A ValueError is raised if the glass modulus is below the static one, or as by `prony`.
     """
     if not glass_modulus >= static_modulus:
         raise ValueError(f"the glass modulus must not be below the static one, got {glass_modulus!r}")
@@ -81,13 +82,13 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
             f"each Prony term needs a modulus and a time, got {stiffness.size} moduli and {time.size} times"
         )
     if not (np.isfinite(static_modulus) and static_modulus > 0):
-        raise ValueError(f"the static modulus must be positive, got {static_modulus!r}")
+        raise ValueError(f"the static modulus must be positive and finite, got {static_modulus!r}")
     if not (np.all(np.isfinite(stiffness)) and np.all(stiffness >= 0)):
-        raise ValueError(f"the moduli of the terms must not be negative, got {stiffness.tolist()!r}")
+        raise ValueError(f"the moduli of the terms must be finite and must not be negative, got {stiffness.tolist()!r}")
     if not (np.all(np.isfinite(time)) and np.all(time > 0)):
-        raise ValueError(f"the relaxation times must be positive, got {time.tolist()!r}")
+        raise ValueError(f"the relaxation times must be positive and finite, got {time.tolist()!r}")
     if not (np.isfinite(viscosity) and viscosity >= 0):
-        raise ValueError(f"the viscosity must not be negative, got {viscosity!r}")
+        raise ValueError(f"the viscosity must be finite and must not be negative, got {viscosity!r}")
     distinct, place = np.unique(time[stiffness > 0], return_inverse=True)
     merged = np.bincount(place, weights=stiffness[stiffness > 0], minlength=distinct.size)
     return LinearSolid(float(static_modulus), merged.astype(np.float64), distinct, float(viscosity))
@@ -107,9 +108,9 @@ class SeriesFit:
     """A Prony series fitted to moduli, and the errors of the fit.
 
     `storage_error` and `loss_error` are the root mean squares of the relative errors of G' and of G''. `storage_error`
-    is NaN if the series was fitted to G'' alone. `largest_error` is the largest relative error of G' or G'', and occurs
-    at the angular frequency `worst_frequency` in rad/s. `range` contains the lowest and the highest angular frequency
-    of the fit.
+    is NaN if the series was fitted to G'' alone. `largest_error` is the largest relative error of the fitted moduli (G'
+    and G'', or G'' alone), and occurs at the angular frequency `worst_frequency` in rad/s. `range` contains the lowest
+    and the highest angular frequency of the fit.
     """
 
     solid: LinearSolid
@@ -138,6 +139,7 @@ def power_law_series(
     `loss_modulus` is G'' in Pa at the angular frequency `frequency` in rad/s. The series follows the law at angular
     frequencies from `lowest` to `highest`. The reciprocals of the relaxation times extend one decade beyond both ends
     of this range. The series has about two terms per decade, and the error of G'' in the range is below 1 %.
+    A ValueError is raised if the exponent does not lie between 0 and 1, or if the range is not positive and ascending.
     """
     if not 0 < exponent < 1:
         raise ValueError(f"the exponent of a power-law spectrum must lie between 0 and 1, got {exponent!r}")
@@ -241,7 +243,10 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
 
 
 def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy: float) -> FloatArray:
-    """Return a_T = exp((E / R) (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol."""
+    """Return a_T = exp((E / R) (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol.
+
+    A ValueError is raised if a temperature or the reference temperature is not positive.
+    """
     absolute = np.asarray(temperature, dtype=np.float64)
     if np.any(absolute <= 0) or reference <= 0:
         raise ValueError(f"absolute temperatures must be positive, got {temperature!r}")
@@ -289,7 +294,10 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero lambda_k from the nearest tau_m."""
+    """Return the distance from tau_m, with m = `pole`, to the zero lambda_k above (`sign` = 1) or below (`sign` = -1).
+
+    `gap` is an upper bound of this distance.
+    """
     high = np.log(gap)
     low = high - 80.0  # exp(-80) is far below the rounding error
     place = 0.5 * (low + high)

@@ -34,11 +34,11 @@ def test_equal_times_merge_and_empty_terms_vanish():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((0.0, [], []), "static modulus must be positive, got 0.0"),
+        ((0.0, [], []), "static modulus must be positive and finite, got 0.0"),
         ((1.0, [1.0], []), "got 1 moduli and 0 times"),
         ((1.0, [-1.0], [1.0]), "must not be negative, got \\[-1.0\\]"),
-        ((1.0, [1.0], [0.0]), "relaxation times must be positive, got \\[0.0\\]"),
-        ((1.0, [], [], -1.0), "viscosity must not be negative, got -1.0"),
+        ((1.0, [1.0], [0.0]), "relaxation times must be positive and finite, got \\[0.0\\]"),
+        ((1.0, [], [], -1.0), "viscosity must be finite and must not be negative, got -1.0"),
     ],
 )
 def test_impossible_solids_are_refused(arguments, message):

@@ -60,7 +60,7 @@ def _block(jumps: IntArray, begin: int, count: int, number: int) -> None:
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, reach: float, jumps: IntArray) -> None:
-    """Add the parts of a cluster to the lengths in contact of all windows that contain one end of it.
+    """Add the parts of a cluster to the lengths in contact of all windows that contain exactly one end of it.
 
     Only parts that break the layer are added. No part that is longer than `reach` can break the layer.
     """

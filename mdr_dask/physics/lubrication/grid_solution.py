@@ -102,7 +102,10 @@ class GridSolution:
 
 
 def cell_around(nodes: FloatArray, position: float) -> FloatArray:
-    """Return the last node upstream of a position, and the first node at or beyond this position."""
+    """Return the last node upstream of a position, and the first node at or beyond this position.
+
+    If the position is outside the grid, the first or the last two nodes are returned.
+    """
     after = int(np.clip(np.searchsorted(nodes, position), 1, nodes.size - 1))
     return nodes[after - 1 : after + 1]
 
@@ -112,7 +115,8 @@ def expected(
 ) -> FloatArray:
     """Predict the result of `reading` on a grid with a given spacing from the results on one or two earlier grids.
 
-    With two grids, the error of the result is assumed to be proportional to the square of the spacing.
+    With one grid, its result is returned. With two grids, the error of the result is assumed to be proportional to the
+    square of the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:

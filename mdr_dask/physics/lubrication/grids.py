@@ -95,7 +95,7 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 
 
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return a first guess of the pressure: Hertz' ellipse, or, for a thick film, a wider ellipse centred upstream."""
+    """Return a first guess of the pressure: Hertz' ellipse, or, for a thick film, an ellipse centred upstream."""
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width

@@ -59,8 +59,9 @@ def share_load(
     `film_at` returns the film that carries a given load share, or 0 if the film is too thin to be computed.
     `asperity_share` returns the load share of the asperities at a given film. `film_at` and `asperity_share` are
     decreasing functions. `tolerance` is the allowed relative error of the film's load share. The relative error of the
-    film thickness is about a quarter of `tolerance`. If no film balances the load, the asperities carry the whole load,
-    and film and film share are 0.
+    film thickness is about a quarter of `tolerance`, because the film varies approximately as (load share)^(-1/4). If
+    the asperities carry less than `tolerance` at the film that carries the whole load, this film is returned. If no
+    film balances the load, the asperities carry the whole load, and film and film share are 0.
     """
 
     def excess(logarithm: float) -> float:

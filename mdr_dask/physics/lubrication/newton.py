@@ -286,7 +286,7 @@ def _take_step(
     """Change P, H and the film at ``X = 0`` by the allowed fraction of a Newton step.
 
     Return the film at ``X = 0`` and the relative size of the step. The size is infinite for a shortened step. The size
-    is NaN if the allowed fraction is below the rounding error, or if the film closes.
+    is NaN if the allowed fraction is below the rounding error (then nothing is changed), or if the film closes.
     """
     share = _step_length(grid, P, H, step, change, clip)
     if not share > EPS:

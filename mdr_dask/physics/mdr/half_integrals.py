@@ -139,7 +139,10 @@ def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArra
 
 @jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
-    """Return the piecewise polynomial through `values` at the position `place`, or 0 from the end of the mesh on."""
+    """Return the piecewise polynomial through `values` at the position `place`, or 0 from the end of the mesh on.
+
+    Before the first edge, the polynomial of the first panel is continued.
+    """
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order

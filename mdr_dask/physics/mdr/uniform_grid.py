@@ -22,7 +22,8 @@ from mdr_dask.physics.refine import EPS, MOST_ITERATIONS
 class UniformGrid:
     """Nodes 0, h, 2h, ... and (n, n) matrices with f = inverse @ g, g = forward @ f and p / E* = stress @ q.
 
-    The line load q is d - g inside the contact and zero outside.
+    The line load q is d - g inside the contact and zero outside. A contact that does not end on the grid is cut off at
+    the last node.
     """
 
     nodes: FloatArray

@@ -1,6 +1,6 @@
 """Laws of shift factors: a power of the velocity, Arrhenius' law, and the WLF law (Williams, Landel and Ferry).
 
-The fits are weighted with the inverse covariance of the factors.
+The fits are weighted with the inverse covariance of the factors. FitError is raised if a law has too few factors.
 """
 
 from __future__ import annotations
@@ -52,7 +52,10 @@ def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, a
 
 
 def fit_arrhenius(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int) -> ShiftLaw:
-    """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_anchor)`` to temperatures in K; arguments as in `fit_power`."""
+    """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_anchor)`` to temperatures in K.
+
+    The arguments are those of `fit_power`. FitError is also raised if a temperature is not above 0 K.
+    """
     if np.any(temperature <= 0):
         raise FitError(f"the law of Arrhenius needs temperatures above 0 K, got {temperature.min():.9g} K")
 
@@ -137,7 +140,8 @@ def _fit(
 
     Return the law, in which `constants` is still empty; the values of the constants and their covariance; and the half
     width of a 95 % interval in standard errors. If deviations from the law exceed the errors of the factors, an
-    additional scatter is fitted. The square of this scatter is added to the variances of the factors.
+    additional scatter is fitted. The square of this scatter is added to the variances of the factors. Factors with the
+    variance 0, such as that of the anchor, are not fitted.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size

@@ -28,7 +28,10 @@ FREE = (0.03, 1.5)
 """Like `OFFSET`, but for the steps of free vertical factors from one curve to the next."""
 
 DETERMINED = 0.5
-"""A step between neighbouring shifts is undetermined if its standard deviation exceeds this share of `STEP_SCATTER`."""
+"""A step between neighbouring shifts is undetermined if its standard deviation exceeds this share of `STEP_SCATTER`.
+
+A step is also undetermined if the curves are separated by a gap (see `_gaps`) in more than half of the draws.
+"""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 
@@ -64,8 +67,9 @@ class Superposition:
     curve_cross : array
         Covariance of the merged curves and the factors. The axes are channel, curve point and factor.
     measured : tuple of float
-        Range of log10 x of the points measured at the reference. Outside this range the merged curve depends on the
-        shift factors, because only shifted points determine the curve there.
+        Range of log10 x of the shifted points of the group at the reference, or of the nearest group if the reference
+        lies between two groups. Outside this range the merged curve depends on the shift factors, because only the
+        points of other groups determine the curve there.
     undetermined : tuple of (float, float)
         First and last group of each range in which the curves do not determine the shifts, for example on a plateau or
         across a gap.
@@ -132,11 +136,11 @@ def superpose(
         (points,). The array y has the same shape, or the shape (channels, points) for channels that are shifted
         together, such as storage and loss modulus.
     vertical : {'none', 'modulus', 'compliance', 'free'}
-        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. With 'modulus',
-        the known factor b_T = rho0 T0 / (rho T) is therefore applied, and with 'compliance' its inverse; the density
-        rho is computed with `EXPANSION`. In addition, each curve has an unknown offset, which is the same for all
-        channels of the curve and has the prior `OFFSET`. With 'free', the factors are unknown and change from curve to
-        curve by steps with the prior `FREE`.
+        Factors along the ordinate; 'none' means that there are none. A modulus of a polymer is proportional to density
+        times temperature. With 'modulus', the known factor b_T = rho0 T0 / (rho T) is therefore applied, and with
+        'compliance' its inverse; the density rho is computed with `EXPANSION`. In addition, each curve has an unknown
+        offset, which is the same for all channels of the curve and has the prior `OFFSET`. With 'free', the factors are
+        unknown and change from curve to curve by steps with the prior `FREE`.
     reference : float, optional
         Group, or value between two groups (see `rereference`), at which the factors are zero. None means the middle
         group.
@@ -148,8 +152,9 @@ def superpose(
     Raises
     ------
     DataError
-        If there are fewer than two curves, if two groups are equal, if a curve has fewer than two distinct points or
-        numbers that are not finite, if all curves are constant, or if the reference is outside the range of the groups.
+        If there are fewer than two curves, if groups and curves or x and y differ in length, if two groups are equal,
+        if a curve has fewer than two distinct points or numbers that are not finite, if all curves are constant, or if
+        the reference is outside the range of the groups.
 
     Examples
     --------
@@ -349,8 +354,8 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error ``(x - a) (b - x) |h''| / 2`` of the linear interpolation at x between the neighbours a and b.
 
-    h'' is the larger of the second derivatives of the factors at a and b. At the first and the last group, where no
-    second derivative is known, 0 is used.
+    ``|h''|`` is the larger of the absolute second derivatives of the factors at a and b. At the first and the last
+    group, where no second derivative is known, 0 is used.
     """
     after = int(np.clip(np.searchsorted(places, place), 1, places.size - 1))
     slopes = np.diff(factors) / np.diff(places)

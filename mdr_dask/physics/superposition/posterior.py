@@ -42,7 +42,9 @@ The bend is the standard deviation of the second differences of the spline.
 """
 
 SCALE_SCATTER = 3.0
-"""Prior standard deviation of ln(bend) and ln(scatter); two standard deviations are a factor of 400.
+"""Prior standard deviation of ln(scatter), and of the mean of ln(bend) over all curves of a channel.
+
+Two standard deviations are a factor of 400.
 
 The logarithm of the bend is assumed to change by about 1 from one curve to the next, because a master curve is bent in
 some places only.
@@ -52,10 +54,13 @@ REACH = 0.3
 """Distance over which the bend changes from one curve to the next, in widths of a curve."""
 
 TREND = 10.0
-"""Ratio of the prior standard deviations of the mean step of drifting offsets and of the steps about this mean."""
+"""Prior standard deviation of the mean step of drifting offsets, divided by that of the steps about this mean."""
 
 FARTHEST = 8.0
-"""Largest distance of ln(bend), ln(noise) or ln(offset scatter) from its prior median. This prevents overflow."""
+"""Largest distance of ln(bend), ln(noise) or ln(offset scatter) from its prior median.
+
+No shift exceeds this number of curve widths times the number of curves. The limits prevent overflow.
+"""
 
 
 @dataclass(frozen=True)
@@ -290,7 +295,10 @@ def _inverse_band(factor: FloatArray) -> FloatArray:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the index of the first of four splines at each position (in cells), and values and slopes of all four."""
+    """Return the index of the first of four splines at each position (in cells), and values and slopes of all four.
+
+    Outside the cells, a spline is continued by its tangent.
+    """
     first = np.clip(np.floor(place), 0, splines - ORDER).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     powers = np.vander(inside.ravel(), ORDER, increasing=True).reshape(*inside.shape, ORDER)

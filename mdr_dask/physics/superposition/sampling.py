@@ -17,23 +17,26 @@ HOPS = 2
 """Number of jumps after each move; a jump changes the step between two neighbouring curves. Chosen by trial."""
 
 CHAINS, KEPT = 24, 20
-"""Number of chains, and number of moves of each chain that are kept. At least as many earlier moves are discarded.
+"""Number of chains, and number of draws from each chain. At least as many earlier moves of the chain are discarded.
 
 The 24 x 20 = 480 draws determine the ends of a 95 % interval to about 6 % of its half width.
 """
 
 CONVERGED = 1.1
-"""Potential scale reduction factor below which chains count as converged, as Gelman and Rubin recommend."""
+"""Potential scale reduction factor of the shifts below which chains count as converged, after Gelman and Rubin."""
 
 STEPS = 3
-"""Number of steps of a move, chosen by trial. A move is on average a quarter of an oscillation in a normal density."""
+"""Number of integration steps of a Hamiltonian move, chosen by trial.
+
+A move is on average a quarter of an oscillation in a normal density.
+"""
 
 
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
     For each pair of neighbouring curves, many values of the step between their two shifts are tried. The probabilities
-    of these values give the mean and the variance of the step, which are then combined with the prior of the shifts.
+    of these values give the mean and the variance of the step, which are then combined with the prior of the steps.
     """
     steps = np.linspace(-2.0, 2.0, 81)  # in widths of the wider of the two curves
     means, variances = [], []
@@ -70,7 +73,9 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
     """Return the curves, with the number of `splines` that was used, and a row of parameters for each draw.
 
-    If the chains have not converged after the longest attempt, its draws are returned all the same.
+    In the first attempt, the position of a chain after every move is a draw. As long as the chains have not converged,
+    a longer attempt follows, with a draw after every second, fourth or eighth move. If the chains have not converged
+    after the longest attempt, its draws are returned all the same.
     """
     shifts = first_guess(curves)
     curves = laid_out(curves, shifts)
@@ -98,7 +103,10 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
 def _moved(
     curves: Curves, place: FloatArray, here: Solved, scale: FloatArray, generator: np.random.Generator
 ) -> tuple[FloatArray, Solved, float]:
-    """Move all chains by one Hamiltonian move and `HOPS` jumps; also return the acceptance probability of the move."""
+    """Move all chains by one Hamiltonian move and `HOPS` jumps, each of which may be rejected.
+
+    The last result is the mean acceptance probability of the Hamiltonian moves.
+    """
     length = np.pi / 2 / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
     momentum = generator.standard_normal(place.shape)
     speed, new, there = momentum, place, here

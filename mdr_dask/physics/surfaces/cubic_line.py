@@ -85,11 +85,12 @@ def without_kinks(line: CubicLine) -> CubicLine:
 class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
-    A periodic line starts in the cell of its highest point. Heights are relative to the highest point, so that small
-    depths under light loads are not lost to rounding. `peak` is the largest height in each cell. `mean` is the integral
-    of the height over each cell, and `stretch` is the integral of the squared slope. The highest point has the height
-    `top` on the original line. A period of a periodic line begins at this point, whose position in cell 0 is `start`.
-    If the line is not periodic, `start` is 0.
+    If the line is not periodic, the heights in the additional cell are those of the last node. A periodic line starts
+    in the cell of its highest point. Heights are relative to the highest point, so that small depths under light loads
+    are not lost to rounding. `peak` is the largest height in each cell. `mean` is the integral of the height over each
+    cell, and `stretch` is the integral of the squared slope. The highest point has the height `top` on the original
+    line. A period of a periodic line begins at this point, whose position in cell 0 is `start`. If the line is not
+    periodic, `start` is 0.
     """
 
     height: FloatArray
@@ -192,7 +193,7 @@ def _turned(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the arrays of `Cells`, starting with cell `first` of the line and ending with a copy of this cell.
 
-    Heights are relative to `top`.
+    Heights are relative to `top`. If the line is not periodic, the nodes of the copy have the height of the last node.
     """
     nodes, entered, left, n = line.height, line.enter, line.leave, line.enter.size
     height, enter, leave, peak, mean, stretch = (
@@ -223,7 +224,7 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
     The integral over the first cell is not changed, because a period begins and ends inside this cell. The integrals
-    over the remaining cells are shifted by equal amounts, which preserves the sum over all cells.
+    over the remaining cells are shifted by equal amounts, so that the sum over all cells is still that of the formula.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

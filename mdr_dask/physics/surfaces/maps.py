@@ -36,8 +36,9 @@ class SurfaceMap(NamedTuple):
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     """Return a mask of points that deviate from their neighbours on both axes by more than `FAR` standard deviations.
 
-    The standard deviation is estimated from the median of the deviations. Points at the edges of the map are never in
-    the mask, and neither are points that deviate only because a neighbour is an outlier.
+    The standard deviation is estimated from the median of the deviations. If the median is 0, no point is in the mask.
+    Points at the edges of the map or next to a missing point are never in the mask, and neither are points that deviate
+    only because a neighbour is an outlier.
     """
     height = surface.height
     middle = height[1:-1, 1:-1]
@@ -78,7 +79,7 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
 def filled(surface: SurfaceMap) -> SurfaceMap:
     """Return a map in which each missing point is the mean of its neighbours (Laplace's equation).
 
-    DataError is raised as by `require_points`.
+    A map without missing points is returned unchanged. DataError is raised as by `require_points`.
     """
     require_points(surface)
     missing = ~np.isfinite(surface.height)
@@ -107,7 +108,7 @@ def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
 def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
     """Return a map minus a least-squares polynomial: the mean, a plane, or a polynomial of second degree in x and y.
 
-    Missing points (NaN) are ignored and stay missing.
+    If `order` is "none", the map is returned unchanged. Missing points (NaN) are ignored and stay missing.
     """
     if order == "none":
         return surface
@@ -142,13 +143,14 @@ class MapSpectrum:
     """The spectrum of a map, summed in rings in the plane of the wave vectors.
 
     The width dq of a ring is 2 pi divided by the shorter side of the map. `density` is C2D, m^4: the power in a ring
-    divided by the area of the ring, so that rms height and rms gradient are preserved. `count` is the number of waves
-    in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves that are
-    statistically independent: 1 without a window, less than 1 with a window. `rms_height`, m, is the rms height of the
-    windowed map. `slopes` contains the mean square of the slope along x and the mean square of the slope along y.
-    `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power, with the angle
-    from the x axis to the wave vector. Both means are 0 for an isotropic surface. `cuts` contains the wave numbers and
-    C_cut, m^3, of straight profiles: first along x, then along y.
+    divided by the area of the ring, so that the rms height of the waves in all rings is preserved. Waves beyond the
+    last ring, which reaches to the smaller Nyquist wave number of the two axes, are left out. `count` is the number of
+    waves in each ring; a wave vector and its negative count as two waves. `independent` is the fraction of the waves
+    that are statistically independent: 1 without a window, less than 1 with a window. `rms_height`, m, is the rms
+    height of the windowed map. `slopes` contains the mean square of the slope along x and the mean square of the slope
+    along y. `angular` contains the means of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power, with
+    the angle from the x axis to the wave vector. Both means are 0 for an isotropic surface. `cuts` contains the wave
+    numbers and C_cut, m^3, of straight profiles: first along x, then along y.
     """
 
     wavenumber: FloatArray
@@ -196,7 +198,7 @@ class MapSpectrum:
         The second and the fourth angular harmonic are averaged over all wave numbers at which the roughness exceeds the
         noise. The weights are the contributions to the mean square of the height or of the gradient. The square of each
         of these four averages is reduced by the value that scatter alone would exceed with a probability of 5 %. The
-        anisotropy is the square root of the largest result.
+        anisotropy is the square root of the largest result, or 0 if all results are negative.
         """
         there = self.wavenumber <= noise_limit(self.binned())
         found, power = [], self.density[there] * self.wavenumber[there]

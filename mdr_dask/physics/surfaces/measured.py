@@ -39,10 +39,11 @@ def measured_line(
 ) -> MeasuredLine:
     """Turn positions and heights (in m) of a recorded line into one period of a line with uniform spacing.
 
-    The length of the period is the number of points times the mean spacing. At both ends, a cosine window reduces the
-    heights towards their mean. `taper` is the fraction of the line that the window changes: 0.1 means 5 % of the line
-    at each end. Waves shorter than `shortest` or longer than `longest` are removed; 0 means no limit. DataError is
-    raised if there are fewer than 8 pairs, if a number is not finite, or if the positions neither ascend nor descend.
+    The length of the period is the number of points times the mean spacing. A trend is removed first (see `detrended`).
+    At both ends, a cosine window reduces the heights towards their mean. `taper` is the fraction of the line that the
+    window changes: 0.1 means 5 % of the line at each end. Waves shorter than `shortest` or longer than `longest` are
+    removed; 0 means no limit. DataError is raised if there are fewer than 8 pairs or the two arrays differ in length,
+    if a number is not finite, or if the positions neither ascend nor descend.
     """
     x, z = _ordered(position, height)
     length = float(x[-1] - x[0]) * x.size / (x.size - 1)

@@ -80,7 +80,7 @@ def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # eight entries, enough for the powers of two within a factor of 128
+@lru_cache(maxsize=8)  # eight entries, enough for the powers of two within a factor of 128 of one realisation
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False

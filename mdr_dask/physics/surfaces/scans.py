@@ -25,7 +25,8 @@ STEEPEST = 30.0
 class Cut(NamedTuple):
     """The spectrum of straight profiles in logarithmic bins of the wave number q, rad/m.
 
-    `density` is C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq. `error` is the relative standard error of C_cut.
+    `density` is C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq. `error` is the relative standard error of C_cut. The
+    bins of a map (`MapSpectrum.binned`) contain C2D, m^4, instead of C_cut.
     """
 
     wavenumber: FloatArray
@@ -73,7 +74,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the bins before the first fall that is steeper than `STEEPEST`; the spectrum ends at this fall."""
+    """Return the bins before the first fall that is steeper than `STEEPEST`, or all bins if there is no such fall."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -84,7 +85,8 @@ def of_cut(cut: Cut) -> tuple[Spectrum, FloatArray]:
     """Return the isotropic spectrum C2D of a surface with the given cut, and the standard errors of log C2D.
 
     The standard errors are large below the roll-off, where C2D hardly influences the cut. If the cut has fewer than
-    three wave numbers before its end (see `STEEPEST`), DataError is raised.
+    three wave numbers before its end (see `STEEPEST`), DataError is raised. The result has one wave number more than
+    the cut has before its end.
 
     C2D is assumed to be a power law between adjacent wave numbers of the cut, and is fitted by least squares. The fit
     amplifies noise less than the explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk, because the change of the

@@ -40,7 +40,7 @@ def noise_limit(bins: Cut, roughness: float = -2.0, decades: float = 0.3) -> flo
     The tail comprises the last `decades` decades of the wave number. The slope d log C / d log q is 0 for noise, and at
     most `roughness` for a surface: -2 for C2D, and -1 for a straight profile. The tail is noise if its slope is closer
     to 0 than to `roughness`. The spectrum is noise where the noise exceeds the roughness. If it does so everywhere, the
-    first wave number is returned.
+    first wave number is returned. A tail with fewer than three bins, or with a bin that is zero, is not taken as noise.
     """
     wavenumber, density = bins.wavenumber, bins.density
     there = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)

@@ -58,15 +58,18 @@ class Spectrum:
     def line(self, length: float, modes: int) -> FloatArray:
         """Return the amplitudes A_k, m, of the harmonics q_k = 2 pi k / L for an MDR line with the length L.
 
-        A_k = 2 sqrt(C1D(q_k) 2 pi / L), with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height of the
-        surface, and its rms slope equals the rms gradient of the surface.
+        A_k = 2 sqrt(C1D(q_k) 2 pi / L), with C1D = pi q C2D (thesis 2.19, 2.20). If the harmonics resolve the
+        spectrum, the line has the rms height of the surface, and its rms slope equals the rms gradient of the surface.
         """
         q = 2 * np.pi / length * np.arange(1, modes + 1)
         amplitude: FloatArray = 2 * np.sqrt(np.pi * q * self.at(q) * (2 * np.pi / length))
         return amplitude
 
     def between(self, longest: float = 0.0, shortest: float = 0.0) -> Spectrum:
-        """Return the spectrum of the waves between two wavelengths in m. A wavelength of 0 means no limit."""
+        """Return the spectrum of the waves between two wavelengths in m. A wavelength of 0 means no limit.
+
+        If the spectrum has no waves between the wavelengths, DataError is raised.
+        """
         low = max(2 * np.pi / longest if longest else 0.0, float(self.wavenumber[0]))
         high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
         if not low < high:
@@ -80,8 +83,8 @@ class Spectrum:
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
         """Return the spectrum, continued by power laws up to the wavelength `longest` and down to `shortest`, m.
 
-        A wavelength of 0 means no change. The exponent is fitted to the points within `decades` decades of the end that
-        is continued.
+        A wavelength of 0, or a wavelength within the spectrum, means no change. The exponent is fitted to the points
+        within `decades` decades of the end that is continued, and to at least two points.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (

@@ -104,7 +104,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
 
 @jit
 def _extremes(of: Piece) -> tuple[float, float]:
-    """Return the positions of the extremes of a piece, ascending; an extreme outside 0 to 1 is replaced by 0."""
+    """Return the positions of the extremes of a piece, ascending; an extreme that is missing or outside 0 to 1 is 0."""
     a, b, c = 3 * of[3], of[2], of[1]  # the slope is a t^2 + 2 b t + c
     root = b * b - a * c
     if root <= 0:

@@ -44,7 +44,10 @@ class Waves:
 
 
 def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT."""
+    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT.
+
+    If there are fewer than two nodes per shortest wave, a ValueError is raised.
+    """
     modes = coefficients.size
     if nodes < 2 * modes:
         raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")

@@ -61,20 +61,22 @@ def checked_exact(
         See `mdr_dask.physics.wear.exact.exact`.
     outputs : sequence of str
         Attributes of `Worn` whose errors are estimated, for example ``["wear_volume", "height"]``. If there are none,
-        one solution with the default tolerance is returned.
+        one solution with the default tolerance is returned, and no errors are estimated.
     places : array
         Positions at which functions of position are compared, in units of a0.
     accuracy : float, optional
         Allowed error of every output relative to its largest value. If no tolerance meets the accuracy, the solution
         with the smallest tolerance is returned. Without an accuracy, the solution with the default tolerance is
-        returned. In both cases, the errors of this solution are estimated.
+        returned. In all three cases, the errors of the returned solution are estimated.
 
     Raises
     ------
     ValueError
-        If the contact reaches beyond the table of the profile.
+        If the stick radius is not at least 0 and below 1, or if, in partial slip, the contact reaches beyond the table
+        of the profile.
     NotConvergedError
-        If the evolution cannot be advanced at any tolerance.
+        If the evolution cannot be advanced at any tolerance, for example because, in gross slip, the contact reaches
+        beyond the table of the profile.
     """
 
     def solve(level: int, which: IntArray) -> list[Worn]:
@@ -90,8 +92,8 @@ def checked_history(
 ) -> list[Checked]:
     """Return the contact at the end of every block of load on a grid with `cells` cells up to the radius `reach`.
 
-    The errors are estimated from solutions with 1/2 and 1/4 of the cells. `outputs` and `places` are those of
-    `checked_exact`. A ValueError is raised if the contact reaches beyond the grid.
+    The errors are estimated from solutions with 1/2 and 1/4 of the cells, unless `outputs` is empty. `outputs` and
+    `places` are those of `checked_exact`. A ValueError is raised if the contact reaches beyond the grid.
     """
 
     def solve(cells: int, which: IntArray) -> list[Worn]:
@@ -110,7 +112,11 @@ def _checked(
     outputs: Sequence[str],
     places: FloatArray,
 ) -> list[Checked]:
-    """Return every contact from the coarsest level on which all outputs meet the accuracy, or from the finest level."""
+    """Return every contact from the coarsest level on which all outputs meet the accuracy.
+
+    A contact that does not meet the accuracy on any level is taken from the finest level with a solution. If a contact
+    has no solution on any level, NotConvergedError is raised.
+    """
     found: dict[tuple[int, int], Worn] = {}
     problems = []
 

@@ -1,7 +1,7 @@
 """Time integration of a worn contact with backward differentiation formulas (BDF) of order 1 to 3.
 
-The equations are stiff. The nodes move with the contact edge. In every time step, Newton's method solves for the image
-and the position of the edge together.
+The equations are stiff. The nodes move with the contact edge. In every time step, Newton's method solves for all
+unknowns together: the image, the position of the edge and, under constant force, the depth and a moving stick border.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import CLOSE, MOST_ITERATIONS
 from mdr_dask.physics.wear.slip import GrossSlip, Moment, PartialSlip
 
-#: The local errors of BDF steps of order 1, 2 and 3, as fractions of the difference between the result and the value
-#: extrapolated from the previous steps.
+#: The local errors of BDF steps of order 1, 2 and 3 after steps of equal length, as fractions of the difference between
+#: the result and the value extrapolated from the previous steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 #: Largest ratio of a time step to the previous one, chosen by trial. BDF of order 3 is unstable only if the ratio stays
 #: above 1.618 in many successive steps. With 1.8, more estimated errors exceed the true errors than with 1.618.
@@ -43,8 +43,9 @@ def march(
     """Return the contact at the start of the march, and the contact at the end of every accepted time step.
 
     The march ends with the first contact for which the time is at least `end`, or `stops` returns True. `tolerance` is
-    the allowed error of the results of ``problem.worn`` in one time step. `first` is the length of the first time step.
-    If even a very short time step fails, NotConvergedError is raised.
+    the allowed error of the results of ``problem.worn`` in one time step. `first` is the length of the first time step
+    that is tried. If `start` is None, the march starts with the virgin contact (see `settled`). If even a very short
+    time step fails, NotConvergedError is raised.
     """
     newton = _Newton(problem)
     history = [settled(problem) if start is None else start]
@@ -75,7 +76,10 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
-    """Return the contact at a time within the history, by additional time steps if the history lacks this time."""
+    """Return the contact at a time within the history, by additional time steps if the history lacks this time.
+
+    If even a very short time step fails, NotConvergedError is raised.
+    """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return history[before]
@@ -141,7 +145,9 @@ class _Newton:
     ) -> FloatArray | None:
         """Return the solution, or None if the iteration fails.
 
-        It also counts as a failure if the changes grow, or if they shrink too slowly with a reused Jacobian.
+        The iteration fails if the residual is not finite, the Jacobian is singular, the unknowns become impossible (see
+        `holds` of the problem), the changes of the unknowns grow or, with a reused Jacobian, shrink too slowly, or if
+        `MOST_ITERATIONS` steps are not sufficient.
         """
         is_reused, last = self.factors is not None, np.inf
         for _ in range(MOST_ITERATIONS):
@@ -158,7 +164,7 @@ class _Newton:
             if not (np.isfinite(size) and self.problem.holds(unknowns)):
                 return None
             rate = size / last
-            # the sum of all further changes, if the ratio of successive changes stays the same
+            # the sum of all further changes at the same ratio, or the last change if the changes shrink too slowly
             left = size * rate / (1.0 - rate) if 0.0 < rate <= SLOWEST else size
             if left < CLOSE:
                 return unknowns
@@ -172,7 +178,10 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian. Derivatives with respect to unknowns other than the image are finite differences."""
+        """Factorise the Jacobian. If it is singular, `factors` is None.
+
+        Derivatives with respect to unknowns other than the image are finite differences.
+        """
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()

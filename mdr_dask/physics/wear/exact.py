@@ -47,7 +47,7 @@ class Resolution(NamedTuple):
         """Number of nodes in a panel.
 
         If the allowed error falls to a quarter, a panel has one more node, because the panels far from the border and
-        the edge do not become narrower. With more than six nodes, time steps may fail.
+        the edge do not become narrower. There are at most six nodes, because time steps may fail with more nodes.
         """
         return min(2 + round(float(np.log(COARSEST / self.accuracy) / np.log(4.0))), 6)
 
@@ -99,7 +99,8 @@ def exact(
         amounts may be in any order. In partial slip, an infinite value gives the limiting profile.
     accuracy : float
         Allowed error of f, divided by eta d0 in partial slip (where the worn depth is of the order of eta d0), and by
-        d0 in gross slip. Errors below `ERROR` are not reached, because round-off accumulates over the time steps.
+        d0 in gross slip. Errors below `ERROR` are not reached, because round-off accumulates over the time steps. A
+        value above `COARSEST` is replaced by `COARSEST`.
     constant_force : bool
         Whether the force of the virgin contact is kept constant instead of the depth.
 
@@ -111,9 +112,11 @@ def exact(
     Raises
     ------
     ValueError
-        If the contact reaches beyond the table of the profile.
+        If the stick radius is not at least 0 and below 1, or if, in partial slip, the contact reaches beyond the table
+        of the profile.
     NotConvergedError
-        If the evolution cannot be advanced.
+        If the evolution cannot be advanced, for example because, in gross slip, the contact reaches beyond the table of
+        the profile.
 
     Examples
     --------
@@ -145,7 +148,8 @@ def _fretted(
     """Return the contact after each wanted number of cycles.
 
     After very many cycles (see `ENDED`), the contact is the limiting profile. All earlier contacts are taken from the
-    same solution.
+    same solution. Under constant force, this solution consists of two marches: first with a moving stick border, then
+    with a fixed one.
     """
     c = _moved(profile, stick_radius, resolution.flat) if constant_force else stick_radius
     reach = profile.largest_radius
@@ -188,7 +192,7 @@ def _fretted(
 def _moved(profile: Profile, c: float, rise: float) -> float:
     """Return the stick border b of the virgin body pressed deeper by rise * eta, from g0(b) = g0(c) + rise * eta.
 
-    By rounding errors, the rise can be negative or b slightly smaller than c. The result is never smaller than c.
+    Because of rounding errors, `rise` can be negative, or the computed b slightly smaller than c. The result is then c.
     """
     level = float(profile.image(np.array(c)))
     return max(profile.inside(level + max(rise, 0.0) * (1.0 - level)), c)
@@ -205,7 +209,7 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
 
 
 def _frozen(problem: PartialSlip, path: FloatArray) -> tuple[FloatArray, FloatArray, Function]:
-    """Return the radii that the stick border has passed, and the depth d1 (unit d0) at which it passed each radius.
+    """Return the radii that the stick border has passed, and the depth d1 (unit d0) when it passed each radius.
 
     At these radii the image is d1 - eta. The third result is the slope of this image as a function of position.
     """
@@ -295,7 +299,10 @@ def _contact(problem: PartialSlip, moments: Sequence[SlipMoment], time: float) -
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return radii from c to the border at which integrals are split, closer together near the border."""
+    """Return radii from c to the border at which integrals are split, closer together near the border.
+
+    If the border is still at c, no radii are returned.
+    """
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)

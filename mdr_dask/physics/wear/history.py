@@ -2,7 +2,7 @@
 
 The wear rate is df/dN = p(r) s(r), where the slip s is the half-integral of the positive part of 1 - (d - g) / eta.
 Slip in a block is partial or gross. The grid is uniform, because the image has a kink or a jump at the stick border of
-every earlier block.
+every earlier block with partial slip.
 """
 
 from __future__ import annotations
@@ -70,7 +70,10 @@ def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: Lo
 
 
 def _depth(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> float:
-    """Return the indentation depth of a worn body in a block."""
+    """Return the indentation depth of a worn body in a block.
+
+    If the contact reaches beyond the grid, a ValueError is raised.
+    """
     depth = block.depth if block.depth is not None else grid.depth(image, float(block.force or 0.0))
     if image[-1] <= depth:
         raise ValueError(

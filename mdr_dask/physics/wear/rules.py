@@ -3,7 +3,8 @@
 In the fast rule (thesis eq. 6.11), the image g depends on the number of cycles N through `rest` = exp(-xi N / a(c)),
 where a(c) is the scar radius of the limiting profile. From the stick radius c to x = 1, y = (g - g0(c)) / (1 - g0(c))
 follows a logistic law. Beyond x = 1, g - 1 is the fraction `rest` of g0 - 1. In the limiting profile (eqs. 6.8-6.10),
-`rest` is zero.
+`rest` is zero. For a `Profile`, a ValueError is raised if the stick radius does not lie between 0 and 1, or if the scar
+reaches beyond the table of the profile.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-#: Each piece of integration ends this many times farther from the stick border than the piece before (chosen by trial).
-#: The third piece ends 30^2 = 900 widths of the first piece from the stick border. There, y of the logistic law differs
-#: from its limit 1 by about 1/900.
+#: The second and the third piece of integration end this many times farther from the stick border than the piece before
+#: (chosen by trial). The fourth piece ends at x = 1. The third piece ends 30^2 = 900 widths of the first piece from
+#: the stick border. There, y of the logistic law differs from its limit 1 by about 1/900.
 LAYER_GROWTH = 30.0
 ERROR = 2e-6  # numerical error of every output, divided by its largest value; it excludes the error of the fast rule
 
@@ -41,7 +42,10 @@ _ABSCISSA, _WEIGHT = gauss(16)  # 16 nodes are sufficient for the accuracy `ERRO
 
 
 class Rule(NamedTuple):
-    """A body with the image x^exponent: stick radius c, `level` = c^exponent, eta = 1 - `level`, and `rest`."""
+    """The fast rule for a body with the image x^exponent, or the limiting profile if `rest` (see the module) is 0.
+
+    `c` is the stick radius, `level` is g0(c) = c^exponent, and `eta` is 1 - `level`.
+    """
 
     exponent: float
     c: float
@@ -169,7 +173,10 @@ def _change(rule: Rule, gap: float) -> float:
 
 @jit
 def _cuts(rule: Rule) -> FloatArray:
-    """Return the ends of the pieces of integration: c, the radius with y = 1/2, two larger radii, and 1."""
+    """Return the ends of the pieces of integration: c, the radius with y = 1/2, two larger radii, and 1.
+
+    In the limiting profile, the first four ends are equal to c.
+    """
     cuts = np.empty(5)
     layer = rule.c * math.expm1(math.log1p(rule.eta * rule.rest / (1.0 + rule.rest) / rule.level) / rule.exponent)
     cuts[0], cuts[1] = rule.c, min(rule.c + layer, 1.0)

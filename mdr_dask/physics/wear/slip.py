@@ -148,7 +148,10 @@ class PartialSlip:
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
     def admits(self, unknowns: FloatArray) -> bool:
-        """Return whether y >= 0 in the slip zone (if the border moves), or s >= 0 (if the border does not move)."""
+        """Return whether y >= 0 in the slip zone (if the border moves), or s >= 0 (if the border does not move).
+
+        Values down to -`CLOSE` are admitted.
+        """
         positive = unknowns[: self.size - 1] if self.border is None else self.slip(unknowns)
         return bool(np.min(positive) >= -CLOSE)
 
@@ -210,7 +213,7 @@ class PartialSlip:
         return lambda unknowns: _known(self.panels.mesh, self.body, earlier, self.place(unknowns))
 
     def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
-        """Return the worn depth at values of q that the border has passed."""
+        """Return the worn depth at values of q that the border has passed. For q <= 0, the worn depth is 0."""
         depth = _plateau_rise(self.body, np.stack(rising(path)), place) - _virgin_slip(self.body, place)
         return np.where(place > 0.0, depth, 0.0)
 

@@ -40,11 +40,12 @@ class Worn:
     wear_volume, worn_depth : float
         Wear volume V, and the largest value of f - f0.
     height, image, pressure : callable, array -> array
-        f(r), g(x) and p(r), for any position.
+        f(r), g(x) and p(r). Some methods return NaN for the image outside the contact or the grid.
     relative_error : float
-        Known error of every attribute, divided by its largest value.
+        Known error of every attribute, divided by the largest value of this attribute.
     radius_error : float
-        Known absolute error of both radii. Solutions of different resolution may agree within this error by chance.
+        Known absolute error of the contact radius and of the stick border. Solutions of different resolution may agree
+        within this error by chance.
     """
 
     contact_radius: float
@@ -73,8 +74,8 @@ class Worn:
 class Scar(NamedTuple):
     """The change g - g0 of the image, between the virgin stick radius c = `border` and the `radius` of the scar.
 
-    `change` and its derivative `slope` are functions of position. At the positions in `breaks`, the change is not
-    smooth.
+    `change` and its derivative `slope` are functions of position. Integrals are split at the positions in `breaks`,
+    because the change is not smooth or varies steeply there.
     """
 
     border: float
@@ -159,7 +160,10 @@ def worn_profile(profile: Profile, scar: Scar) -> Function:
 
 
 def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, border: float) -> Function:
-    """Return the pressure p(r) / (E* d0 / a0) of a contact of radius `edge` that sticks up to `border`."""
+    """Return the pressure p(r) / (E* d0 / a0) of a contact of radius `edge` that sticks up to `border`.
+
+    The pressure is 0 outside the contact, and infinite at the tip of a sharp body.
+    """
     c = scar.border
 
     def slope(x: FloatArray) -> FloatArray:
@@ -218,7 +222,7 @@ def worn_by(
 
 
 def deepest(depth: Function, places: FloatArray) -> float:
-    """Return the maximum of the worn depth. Two neighbours of `places` must have at most one maximum between them."""
+    """Return the maximum of the worn depth, which must have at most one maximum between two neighbouring `places`."""
     values = depth(places)
     k = int(np.argmax(values))
     bounds = places[max(k - 1, 0)], places[min(k + 1, places.size - 1)]
