@@ -15,8 +15,8 @@ from mdr_dask.units import seconds
 if TYPE_CHECKING:
     from mdr_dask.execute import Progress
 
-#: Function that draws the progress. Its arguments: the progress, and the times in s since the start and since the last
-#: change of the progress.
+#: Function that draws the progress. Its arguments: the progress (None before it is first known), and the times in s
+#: since the start and since the last change of the progress.
 Draw = Callable[["Progress | None", float, float], None]
 
 
@@ -124,7 +124,8 @@ def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) 
 
     Failed results count towards the percentage. `elapsed` and `unchanged` are the times in s since the start and since
     the last change of the progress. The estimated remaining time is reduced by `unchanged`, and is left out when it
-    reaches zero. While code is compiled, the line says so instead.
+    reaches zero. While code is compiled, the line says so instead. If the progress is not known yet (None), the line
+    contains only ``preparing`` and the elapsed time.
     """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"

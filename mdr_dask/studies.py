@@ -106,7 +106,7 @@ def run(
     resources : Resources, optional
         Threads, processes, a scheduler or a cluster; the default is all cores of this machine.
     retry_failed : bool
-        Whether to compute cases again if they failed or did not converge.
+        Whether to compute results again if they failed or did not converge.
 
     Returns
     -------
@@ -145,9 +145,10 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     -------
     Dataset or DataTree
         The outputs with their units, their errors as ``<output>_error``, and ``status``. The dimensions of these arrays
-        are the axes (or ``case``, if the cases form no grid) and ``realisation``. A campaign with series gives a
-        DataTree with a node for each series. An array is read when it is first used. While results are missing, the
-        attribute ``complete`` is False; functions such as `table` compute means over the available results.
+        are the axes (or ``case``, if the cases form no grid), ``realisation``, and the coordinate of an output that is
+        itself a curve, such as a profile. A campaign with series gives a DataTree with a node for each series. An array
+        is read when it is first used. While results are missing, the attribute ``complete`` is False; functions such as
+        `table` compute means over the available results.
 
     Raises
     ------
@@ -215,9 +216,9 @@ def table(
 ) -> pd.DataFrame:
     """Return a study as a table, like ``mdr-dask show``.
 
-    By default, each row contains a case and the means of its outputs with their errors. With ``statistics=None``, each
-    row is a single result. `limit` is the largest number of rows, or 0 for all rows. The other arguments are the same
-    as in `aggregate`, and `sort` is the same as the option of the command.
+    By default, each row contains a case (or, with `group_by`, a group of cases) and the means of its outputs with their
+    errors. With ``statistics=None``, each row is a single result. `limit` is the largest number of rows, or 0 for all
+    rows. The other arguments are the same as in `aggregate`, and `sort` is the same as the option of the command.
 
     Returns
     -------
@@ -300,7 +301,8 @@ def plot(
     figure : str
         Name of a figure or of an output.
     over : sequence of str, optional
-        One axis for curves of an output, or two axes for a map. The default is the axis with the most values.
+        One axis for curves of an output, or two axes for a map. The default is the axis with the most values, or the
+        coordinate of an output that is itself a curve, such as a profile.
     select, where, by, panels, log, measured, units, size, title, style
         The same as the options of the command. `measured` may also be a DataFrame, with units in brackets after the
         column names.
@@ -380,7 +382,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of all cases, as far as the study contains the quantities in their formulas."""
+        """The dimensionless numbers of all cases, except numbers with a quantity that the study lacks."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})

@@ -27,7 +27,7 @@ FILES = (".csv", ".json", ".nc", ".zarr")
 def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
     """Print a table in aligned columns with at most `limit` rows, or all rows as CSV or JSON.
 
-    If `join` is true, each mean and its errors are printed in one column.
+    A `limit` of 0 means all rows. If `join` is true, an aligned column contains a mean together with its errors.
     """
     if form == "table":
         _print_aligned(answer, limit, join)
@@ -36,7 +36,7 @@ def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
 
 
 def write_answer(answer: Table, path: Path) -> int:
-    """Write a table to a file in the format that the suffix of `path` states, and return the number of rows."""
+    """Write a table to a ``.csv`` or ``.json`` file, in the format of its suffix, and return the number of rows."""
     rows = 0
 
     def counted() -> Iterator[pd.DataFrame]:
@@ -52,7 +52,7 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise an error if the suffix of a path is unknown, or if a store is at this path."""
+    """Raise UsageError if the suffix of a path is unknown, or if a store is at this path."""
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)

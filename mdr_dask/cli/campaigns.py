@@ -104,7 +104,7 @@ def _model(name: str) -> Model[Any]:
     help="Write the campaign to a new file instead of standard output.",
 )
 def init(model: str, output: Path | None) -> None:
-    """Write a first campaign file for a model: every parameter with a value, its unit and its meaning.
+    """Write a first campaign file for a model: parameters with values, units and meanings; optional ones as comments.
 
     \b
     mdr-dask init sliding_friction -o rubber.yaml

@@ -77,10 +77,10 @@ def plot(
 ) -> int:
     """Draw figures by name, or any output against any axis; without a name, list figures, outputs and axes.
 
-    Without --over, an output is drawn against the axis with the most values. The data of every figure
-    are written to the table FIGURE.csv next to the figure. If a study has more axes than a figure can show, each
-    further axis is fixed at one value, which is printed. Choose another value with --select. Several stores can be
-    drawn in one figure.
+    Without --over, an output is drawn against the axis with the most values, or, if the output is itself a curve (such
+    as a profile), against the coordinate of this curve. The data of every figure are written to the table FIGURE.csv
+    next to the figure. If a study has more axes than a figure can show, each further axis is fixed at one value, which
+    is printed. Choose another value with --select. Several stores can be drawn in one figure.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png

@@ -109,7 +109,7 @@ def fit(
 
 
 def _print_fits(fits: Mapping[str, Fit], groups: Mapping[str, xr.Dataset], form: str | None, limit: int) -> None:
-    """Print the results of all fits that succeed. Then raise FitError with the names of the fits that were refused."""
+    """Print the results of all fits that succeed. If some were refused, then raise FitError with names and reasons."""
     refused = []
     for name, fit in fits.items():
         try:

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     """Yield a function that writes events of a run to the file `log`, and the messages of the events to stderr.
 
-    The entries of `about` describe the run, and are written to `log` with the event ``run begun``.
+    If `log` is None, no file is written. If `quiet` is true, no messages are written. The entries of `about` describe
+    the run, and are written to `log` with the event ``run begun``.
     """
     lock = threading.Lock()
     if log is not None:

@@ -25,7 +25,7 @@ def _units(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> dic
 
 
 def listed(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names in texts. A text may contain several names, separated by commas."""
+    """Return the names in texts. A text may contain several names, separated by commas. Dots become ``_``."""
     return tuple(name.strip().replace(".", "_") for text in texts for name in text.split(",") if name.strip())
 
 

@@ -86,8 +86,8 @@ def titled(name: str, unit: str) -> str:
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
     """Print columns side by side. A table that is too wide is printed in parts or, if it has one row, as a list.
 
-    Each part begins with the first `keys` columns. Columns with the same value in all rows, and columns without values,
-    are named above the table, in a line that begins with `note`.
+    Each part begins with the first `keys` columns. If there are several rows, columns with the same value in all rows
+    and columns without values are left out; a line above the table names them. This line begins with `note`.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[cell(value) for value in column] for column in columns]
@@ -193,7 +193,10 @@ def _unit(title: str) -> str:
 
 
 def print_left(count: int | None) -> None:
-    """Print on stderr that a limit left out `count` rows, or an unknown number of rows if `count` is None."""
+    """Print on stderr that a limit left out `count` rows, or an unknown number of rows if `count` is None.
+
+    Print nothing if `count` is 0.
+    """
     if count != 0:
         click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 
@@ -209,7 +212,10 @@ def print_json(document: Any) -> None:
 
 
 def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
-    """Return the rows of a Dataset, one for each combination of its coordinates, and the units of the columns."""
+    """Return the rows of a Dataset, one for each position along its dimensions, and the units of the columns.
+
+    Coordinates with a single value for the whole Dataset are left out.
+    """
     data = dataset.drop_vars([name for name, coord in dataset.coords.items() if coord.ndim == 0])
     dims = [str(dim) for dim in data.sizes]
     names = [*dims, *(str(name) for name in data.variables if name not in dims)]

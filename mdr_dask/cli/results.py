@@ -33,7 +33,7 @@ store_argument = click.argument("store")
 @click.option(
     "--failures", is_flag=True, help="List failed results with their reasons and the ranges of their parameters."
 )
-@click.option("--messages", is_flag=True, help="List also the warnings of finished results.")
+@click.option("--messages", is_flag=True, help="List failed results, and also the warnings of finished results.")
 @json_option
 def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
     """Show the progress of a study, and the runs that are computing it now.

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     "--case-timeout",
     type=click.FloatRange(min=0, min_open=True),
     metavar="SECONDS",
-    help="Time limit of a case; a case that takes longer is recorded as failed.",
+    help="Time limit of one result (a realisation of a case); a slower result is recorded as failed.",
 )
-@click.option("--retry-failed", is_flag=True, help="Compute cases again if they failed or did not converge.")
+@click.option("--retry-failed", is_flag=True, help="Compute results again if they failed or did not converge.")
 @click.option(
     "--log", type=click.Path(dir_okay=False, path_type=Path), help="Append the events of the run to FILE as JSON lines."
 )

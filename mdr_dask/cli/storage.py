@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     """Read every file of a store, and list damaged, missing and foreign files.
 
-    The exit code is 1 if there are such files or, with --repair, if some of them are left as they are.
+    The exit code is 1 if there are such files. With --repair, it is 1 only if some of them are left as they are.
 
     \b
     mdr-dask verify results/quickstart.zarr

@@ -20,7 +20,8 @@ format_option = click.option(
 def writing(path: Path) -> Iterator[None]:
     """Make the folder of a file to write.
 
-    If writing fails, remove the file and the folders that did not exist before, and name the file in the error.
+    If writing fails, remove the file and the folders that did not exist before. An OSError without a file name gets the
+    name of this file. UsageError is raised if the file is inside a store.
     """
     require_outside(path)
     there = path.exists()

@@ -70,7 +70,11 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
 
 
 def _without_value(states: Sequence[xr.DataArray]) -> list[str]:
-    """Return up to three texts: how many results failed, how many did not converge, and how many are missing."""
+    """Return up to three texts: how many results failed, how many did not converge, and how many are missing.
+
+    If some realisations of a case succeeded and others failed or did not converge, the first text warns that the mean
+    may be biased.
+    """
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in reasons.items()}
@@ -81,7 +85,7 @@ def _without_value(states: Sequence[xr.DataArray]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the origin of a figure that a command drew: the program version, the command and the campaigns."""
+    """Return the origin of a figure: the program version, a command that draws it, and the campaign of each store."""
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 

@@ -27,7 +27,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw measured points with the band of predictions, residuals, and the density of each unknown.
 
     The density of an unknown is grey if the data do not determine this unknown. If the data determine a product of
-    unknowns, the density of this product has a panel too.
+    such unknowns, the density of this product has a panel too.
     """
     found, series, data, left_out = _first(groups)
     varied = _set_values(found, data)
@@ -53,7 +53,8 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset, list[str]]:
     """Calibrate the first series that can be compared with a table of measurements.
 
-    The last value returned is a list of texts that say why the other series are not drawn.
+    The last value returned is a list of texts that say why the other series are not drawn. FitError is raised if no
+    series can be compared.
     """
     reasons = {}
     for name, dataset in groups.items():
@@ -68,15 +69,16 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _set_values(found: fit.Calibration, data: xr.Dataset) -> dict[str, FloatArray]:
-    """Return the measured conditions. A value that belongs to a value of the study is replaced by this value."""
+    """Return the measured conditions, with the value of the study instead of a measured value that belongs to it."""
     near = {name: belonging(each, data[name]) for name, each in found.measured.conditions.items()}
     return {name: np.where(np.isnan(each), found.measured.conditions[name], each) for name, each in near.items()}
 
 
 def _curves(varied: Mapping[str, FloatArray], main: str, count: int, data: xr.Dataset) -> dict[str, Points]:
-    """Divide `count` measured points into curves: the points of a curve differ only in the condition `main`.
+    """Divide `count` measured points into curves, and return the indices of the points of each curve by its label.
 
-    If there are more curves than colours, all points form one curve.
+    The points of a curve differ only in the condition `main`. If this would give more curves than colours, all points
+    form one curve.
     """
     others = {name: each for name, each in varied.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((count, 1))

@@ -47,7 +47,11 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return a colour bar. If `log` is None, the bar is logarithmic for values that suit a logarithmic axis."""
+    """Return a colour bar for the range of some values.
+
+    If `log` is None, the bar is logarithmic if the values suit a logarithmic axis. If `log` is true, the bar is
+    logarithmic if all values are positive.
+    """
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)

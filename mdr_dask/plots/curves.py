@@ -78,7 +78,7 @@ def axes_of(data: xr.Dataset, output: str) -> list[str]:
 
 
 def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
-    """Return the dimension along which a parameter varies, or None for a parameter that does not vary."""
+    """Return the dimension along which both a parameter and an output vary, or None if there is no such dimension."""
     if along in data[output].dims:
         return along
     if along in data.coords and data[along].ndim == 1 and data[along].dims[0] in data[output].dims:
@@ -87,7 +87,10 @@ def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
 
 
 def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
-    """Return the parameters that change along a dimension. In a sampled design, several parameters change together."""
+    """Return the parameters that change along a dimension, or the name of the dimension if there are none.
+
+    In a sampled design, several parameters change together.
+    """
     names = [str(name) for name, values in data.coords.items() if values.dims == (dim,)]
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     return sorted(names or [dim], key=lambda name: axes.index(name) if name in axes else -1)
@@ -159,7 +162,10 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "", series: str 
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return the largest set of series with the same legend and colour bar, and a text about the other series."""
+    """Return the names of the largest set of series with the same legend and colour bar, and a text about the others.
+
+    If there are no other series, the list of texts is empty.
+    """
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)
@@ -198,6 +204,7 @@ def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
     """Return the parameters that have a single value in a series and are worth mentioning.
 
     Parameters without effect are left out. Defaults are left out if they are zero or settings of the solution.
+    If the name of the model is unknown, no parameter is left out.
     """
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
     if "model" not in data.attrs:
@@ -228,7 +235,8 @@ def fixed_by_all(parts: Iterable[xr.Dataset]) -> dict[str, xr.DataArray]:
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     """Return a text with the fixed parameters, for a title.
 
-    The text begins with the parameters that are axes of the study. Other parameters without a symbol are left out.
+    The text begins with the parameters that are axes of the study. Other parameters are left out if they have no symbol
+    or if their value is unknown.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]

@@ -20,7 +20,7 @@ LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_lo
 #: Number of points of a smooth line that is drawn from a formula. Chosen by trial: on paper, the points are less than a
 #: millimetre apart.
 SMOOTH = 400
-#: Entry of the column ``what`` for results of a study.
+#: Entry of the column ``what`` for results of a study, and for the measured points of a calibration or a master curve.
 DATA = "data"
 Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
@@ -79,8 +79,9 @@ class Trace:
     from ``y_low`` to ``y_high``; ``dots`` and the cells of a ``map`` are coloured by ``value``; ``absent`` are marks at
     the lower edge of the panel. The variables of `data` are ``x``, ``y`` and ``value`` in the units of the axes, and
     known limits of intervals, such as ``y_low`` and ``y_high``. The coordinates of `data` are the parameters of each
-    point in SI units. `what` is ``data``, the name of a law, or the reason why cases have no value. `bars` draws
-    intervals as bars instead of a band.
+    point in SI units. `what` says what the points are: ``data``, or for example the name of a law, or the reason why
+    cases have no value. The intervals of points that are joined by a line are drawn as a band, unless `bars` is true;
+    all other intervals are drawn as bars.
     """
 
     kind: Kind
@@ -133,10 +134,10 @@ class Figure:
     """A figure as data.
 
     `subject` is the first part of the title. With ``stack = 3``, panels 1 to 3 form a column, and panels 4 to 6 form
-    the next column. With ``stack = 1``, the panels fill row after row. `fixed` is a text with the fixed parameters, and
-    `bars` is a text that explains the error bars and bands. `left_out` are texts about results that are not drawn.
-    `warnings` are texts about doubtful results. `notes` are texts for the caption and the table. `ratio` is the height
-    of a panel divided by its width. `share_y` gives all panels the same vertical axis.
+    the next column. With ``stack = 1``, the panels fill row after row. `fixed` is a text about the whole figure, such
+    as the fixed parameters, and `bars` is a text that explains the error bars and bands. `left_out` are texts about
+    results that are not drawn. `warnings` are texts about doubtful results. `notes` are texts for the caption and the
+    table. `ratio` is the height of a panel divided by its width. `share_y` gives all panels the same vertical axis.
     """
 
     panels: list[Panel]
@@ -187,7 +188,7 @@ class Figure:
         return {str(name): str(value.attrs.get("units", "1")) for name, value in coords}
 
     def caption(self) -> list[str]:
-        """Return the lines for a caption: the title, the fixed parameters, what is not drawn, and warnings."""
+        """Return the lines for a caption: the title, the fixed parameters, what is not drawn, warnings and notes."""
         attrs = self.table().attrs
         units, held = attrs["units"], attrs["held"]
         fixed = [f"{name} = {_text(held[name], units[name])}" for name in held if name not in self.unnamed]
@@ -245,7 +246,7 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Rename a parameter if another column of the table has the same name."""
+    """Return the name of a parameter, preceded by ``parameter`` if another column of the table has the same name."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 

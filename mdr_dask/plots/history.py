@@ -30,7 +30,8 @@ STEADY = "steady state at the end"
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time, one column of panels for each series.
 
-    The velocity has a panel only if the velocity changes, and the normal force only if the normal force changes.
+    At most `LISTED` series are drawn, all with the same legend. The columns have a panel for the velocity only if the
+    velocity changes in a series, and a panel for the normal force only if the normal force changes in a series.
     """
     needed = {BEFORE, JUMP, FRICTION}
     found = {name: data for name, data in groups.items() if needed <= data.keys() and data[FRICTION].notnull().any()}
@@ -99,7 +100,7 @@ def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
 
 
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times divided by the relaxation time, velocities in m/s and normal forces in N.
+    """Return times divided by `VelocityJump.time_unit`, velocities in m/s and normal forces in N.
 
     The times begin before the history, at -`LEAD` times `last`, and end at `last`.
     """

@@ -68,7 +68,7 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
 
     If all campaign files use the same unit for a quantity, figures show this unit. Otherwise temperatures are in
     degrees Celsius, rotation speeds in rpm, angles in degrees, and other quantities in SI units. A unit such as m
-    or Pa gets a prefix that brings the largest value between 1 and 1000.
+    or Pa gets a prefix that brings the largest value between 1 and 1000 (for m^2, between 1 and 10^6).
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -108,7 +108,10 @@ def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
 
 
 def quantity(name: str, values: xr.DataArray) -> Quantity:
-    """Return the symbol and the shown unit of a parameter or an output."""
+    """Return the symbol and the shown unit of a parameter or an output.
+
+    DataError is raised if values cannot be converted to the requested unit.
+    """
     unit = str(values.attrs.get("units", "1"))
     is_coordinate = name in values.coords
     symbol = page.current().symbols.get(name, name.replace("_", " ")) if is_coordinate else meaning(values, name)

@@ -37,7 +37,7 @@ class Law(NamedTuple):
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
-    """Return the law for an output of a series, or None."""
+    """Return the law for an output of a series, or None if there is no law for this output."""
     model = data.attrs.get("model")
     if model == "ehl_line" and output in FILMS and "inlet" not in data.coords:
         return Law("Pan and Hamrock", lambda part: xr.DataArray(FILMS[output](*groups(part.coords.get))))
@@ -55,8 +55,8 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
 def along(data: xr.Dataset, name: str) -> xr.Dataset:
     """Return the parameters of a curve at many values of `name`, so that a law becomes a smooth line.
 
-    The data are returned unchanged if the values of `name` are not numbers, or if one of the outputs `NEEDED` varies
-    along the curve.
+    The data are returned unchanged if `name` has only one value, if its values are not numbers, or if one of the
+    outputs `NEEDED` varies along the curve.
     """
     values = data[name]
     numeric = values.ndim == 1 and values.dtype.kind in "fiu"

@@ -20,8 +20,9 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 def draw_master_curve(curve: xr.Dataset) -> Figure:
     """Draw a master curve: the curves before shifting, the merged curve and the shift factors.
 
-    The bars and the band show 68 % intervals. The merged curve is solid in the range that was measured in the reference
-    condition, such as the reference temperature, and dashed outside this range.
+    The vertical factors have a panel if a curve is shifted vertically. The bars and the band show 68 % intervals. The
+    merged curve is solid in the range that was measured in the reference condition, such as the reference temperature,
+    and dashed outside this range.
     """
     curve = _in_shown_units(curve)
     attrs = curve.attrs

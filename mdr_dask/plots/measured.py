@@ -110,8 +110,8 @@ def _apart(measured: Measured, data: xr.Dataset, names: Sequence[str]) -> list[s
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> np.ndarray:
     """Add the measured points that belong to the curves of a panel, and return a mask of these points.
 
-    A point has the colour of its curve if it belongs to exactly one of several curves. Other points are black, for
-    example if the table lacks a parameter in which the curves differ.
+    A point has the colour of its curve if it belongs to exactly one of several curves. A point is black if it belongs
+    to more than one curve, because the table lacks a parameter in which they differ, or if the panel has one curve.
     """
     curves = [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]
     if not curves:
@@ -159,7 +159,7 @@ def _on(axis: Axis, places: FloatArray) -> np.ndarray:
 
 
 def _points(panel: Panel, measured: Measured, data: xr.Dataset) -> xr.Dataset:
-    """Return all measured points, with 95 % intervals, in the units of a panel."""
+    """Return all measured points in the units of a panel, with 95 % intervals if the errors are known."""
     x = labels.quantity(panel.x.quantity, data[panel.x.quantity]).of(measured.conditions[panel.x.quantity])
     how, values = labels.quantity(measured.output, data[measured.output]), measured.values
     half = np.full(values.size, np.nan) if measured.errors is None else HALF * measured.errors

@@ -11,7 +11,7 @@ FILM_RATIOS = {
     3.0: "film ratio 3: full film above",
 }
 STRIBECK = ("friction_coefficient", "asperity_load_share", "contact_length", "breakthrough_probability")
-#: For each model, the figures by name. A figure has a summary and views. The views are drawn one above the other.
+#: For each model, the figures by name. A figure has a summary and views (see `mdr_dask.plots.view.draw`).
 FIGURES: dict[str, dict[str, tuple[str, *tuple[View, ...]]]] = {
     "sliding_friction": {
         "velocity": (

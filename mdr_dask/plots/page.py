@@ -37,10 +37,10 @@ class Page:
     """The requested appearance of a figure.
 
     `width` and `height` are in inches. Without a requested height, the height follows from the content. If `title` is
-    None, the title is a description of the figure, or empty if a width is requested. `style` is the name of a style
-    of matplotlib or a style file, and `cycle` holds the colours, lines and markers of this style. `units` maps names
-    of quantities to the requested units, and `symbols` maps names of coordinates to their labels. `used` collects the
-    names of all quantities that figures have shown.
+    None, the title is a description of the figure, or empty if a width is requested. `style` is the name of a style of
+    matplotlib or a style file, and `cycle` holds the colours, lines and markers of this style. `units` maps names of
+    quantities to the units in which they are shown, and `symbols` maps names of coordinates to their labels. `used`
+    collects the names of all quantities that figures have shown.
     """
 
     width: float | None = None
@@ -53,7 +53,7 @@ class Page:
     cycle: tuple[Mapping[str, str], ...] = ()
 
     def unit(self, name: str) -> str | None:
-        """Return the requested unit of a quantity, or None if no unit was requested."""
+        """Return the unit in which figures show a quantity, or None for its own unit. Add the name to `used`."""
         self.used.add(name)
         return self.units.get(name)
 
@@ -74,7 +74,10 @@ def requested(
 
 @contextmanager
 def drawing_for(page: Page) -> Iterator[None]:
-    """Apply the settings of a page to all figures that are drawn within a ``with`` statement."""
+    """Apply the settings of a page to all figures that are drawn within a ``with`` statement.
+
+    DataError is raised if the style is neither a file nor the name of a style of matplotlib.
+    """
     from matplotlib import rc_context, rc_params_from_file
     from matplotlib.style import context, library
 
@@ -107,7 +110,10 @@ def current() -> Page:
 
 
 def sides(text: str) -> tuple[float, float | None]:
-    """Return width and height in inches from a text such as ``85x60mm``. From ``85mm``, return the width alone."""
+    """Return width and height in inches from a text such as ``85x60mm``. For ``85mm``, the height is None.
+
+    DataError is raised if the text has another form, or if a side is not between 20 mm and 1 m.
+    """
     match = re.fullmatch(r"([\d.]+)\s*([a-z]*)(?:\s*x\s*([\d.]+)\s*([a-z]+))?", text.strip())
     if match is None or not (match[2] or match[4]):
         raise DataError(f"expected a width such as '85mm', or width and height such as '85x60mm', got {text!r}")

@@ -87,8 +87,8 @@ def render(description: Figure) -> Drawn:
 def _grid(description: Figure) -> tuple[int, int]:
     """Return the number of rows and the number of columns of panels.
 
-    On a screen, there are up to three columns. If a width is requested, a column of panels is about as wide as a column
-    of a journal. If the rows would then not fit on a page, there are up to twice as many columns.
+    On a screen, there are up to three columns. If a width is requested, there are up to as many columns as columns of
+    a journal fit into the width (rounded). If the rows would then not fit on a page, up to twice as many are used.
     """
     width, stack = page.current().width, description.stack
     stacks = -(-len(description.panels) // stack)
@@ -119,7 +119,11 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Remove the label of an axis that the next panel has too: of x if it is below, of y if it is on the left."""
+    """Remove repeated labels of axes.
+
+    The x label of a panel is removed if the panel below has the same x axis. The y label is removed if the panel on the
+    left has the same y axis.
+    """
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -284,7 +288,10 @@ def _width_of(figure: Drawn, text: str, size: Any) -> float:
 
 
 def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
-    """Break a text into lines of at most `width` inches, but not at an equals sign and not within mathtext."""
+    """Break a text into lines of at most `width` inches, but not at an equals sign and not within mathtext.
+
+    Parts that cannot be broken may give longer lines.
+    """
     joined = text.replace(" = ", "\u00a0=\u00a0")
     lines: list[str] = []
     for word in joined.split(" "):
@@ -308,7 +315,8 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
     """Draw one legend below all panels and return the height of the legend in inches.
 
     If all labels have the same text before the equals sign, this text becomes the title of the legend. If a size is
-    requested, the legend takes at most a third of the height, and the last entries are left out if necessary.
+    requested, the last entries are left out if the legend would take more than a third of the requested height, or of
+    the height of a page if only a width is requested.
     """
     width, asked = figure.get_figwidth(), page.current()
     most = (asked.height or (page.TALLEST if asked.width else np.inf)) / 3

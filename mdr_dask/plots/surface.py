@@ -25,11 +25,11 @@ METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
-    """Draw the power spectrum C2D of every file, the power law of every file, and the spectra of lines.
+    """Draw the power spectrum C2D of every file, its power law if one fits, and the spectra of lines.
 
     There are two kinds of lines: straight cuts through the surface, and the lines that represent the surface in a
     campaign. `spectra` are the spectra that a campaign uses. These spectra contain only wave numbers between the
-    cut-offs, and no noise.
+    cut-offs; if no shortest wavelength is given, they end where the noise begins.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
     densities = np.concatenate([report.bins.density[report.bins.density > 0] for report in reports])
@@ -64,7 +64,7 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
 
 
 def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) -> list[Trace]:
-    """Return the traces of C2D of a file: all values, means in bins, the part used by a campaign, and the power law."""
+    """Return the traces of C2D of a file: all values, means in bins, the part used by a campaign, and any power law."""
     spectrum, bins = report.found.spectrum, report.bins
     raw = columns(file, x=spectrum.wavenumber, y=spectrum.density)
     there = bins.density > 0

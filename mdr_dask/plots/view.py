@@ -20,8 +20,8 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
 #: Largest number of characters in a line of text at a tick. Chosen by trial.
 LONGEST_WORD = 20
-#: `MARKS`: marks for cases without a value. `SOME`: mark for a case with failed realisations, because the mean may then
-#: be biased.
+#: `MARKS`: marks for cases without a value. `SOME`: mark for a case in which some realisations failed or did not
+#: converge, because the mean of the others may be biased.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -36,14 +36,15 @@ Part = tuple[str, dict[str, xr.Dataset]]
 
 @dataclass(frozen=True)
 class View:
-    """The description of a figure of outputs. Several outputs are drawn one above the other.
+    """The description of a figure of outputs. Each output has its own panels (see `draw`).
 
     `over` is the parameter on the horizontal axis. With two parameters, the figure is a map. Colours show the values of
     the parameter `by`. There is one panel for each value of the parameter `panels`. `log` contains the letters of the
     logarithmic axes (x, y, and z for colours). If `log` is None, an axis is logarithmic if the numbers are positive and
-    span more than a factor of ten, with two exceptions: the vertical axis of an output that is a pure number is linear,
-    and both axes are linear for an output that is a curve, such as a profile. If `single` is true, the first
-    realisation is drawn instead of the mean. `guides` contains positions and names of horizontal lines for each output.
+    span more than a factor of ten, with three exceptions: the vertical axis of an output that is a pure number is
+    linear, an axis in a unit with an offset, such as degC, is linear, and both axes are linear if an output that is a
+    curve, such as a profile, is drawn against its own coordinate. If `single` is true, the first realisation is drawn
+    instead of the mean. `guides` contains positions and names of horizontal lines for each output.
     """
 
     outputs: str | tuple[str, ...]
@@ -65,7 +66,7 @@ class View:
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
     def is_log(self, which: str, values: Any, how: labels.Quantity) -> bool:
-        """Return whether an axis is logarithmic. If `log` is None, an axis in a unit such as degC is linear."""
+        """Return whether an axis is logarithmic. A requested logarithmic axis is linear if a value is not positive."""
         values = np.asarray(values, dtype=np.float64)
         positive = bool((values[np.isfinite(values)] > 0).all())
         return not how.offset and is_geometric(values) if self.log is None else which in self.log and positive
@@ -74,8 +75,8 @@ class View:
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
     """Return the parameter that has the most values among the parameters with which an output varies.
 
-    If the output is itself a curve, for example against time, return the coordinate of this curve instead. Return an
-    empty tuple if the output varies with no parameter, or only with those in `without`.
+    The parameters in `without` are not considered. If the output is itself a curve, for example against time, return
+    the coordinate of this curve instead. Return an empty tuple if no parameter is left.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -107,8 +108,10 @@ def figure_of(
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
-    """Draw the outputs of all views, one above the other.
+    """Draw the outputs of all views.
 
+    If the outputs have different numbers of panels, or if more than three outputs have one panel each, the panels fill
+    row after row. Otherwise the outputs are drawn one above the other.
     If a view cannot be drawn, the figure states the reason, unless another view shows the same output. If no view can
     be drawn, DataError is raised with the reason for each series.
     """
@@ -278,8 +281,10 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 def _divided(found: Series, view: View, output: str) -> tuple[list[tuple[str, list[curves.Family]]], list[str]]:
     """Return the title and the curves of each panel, and texts about what is left out.
 
-    If `View.panels` names a parameter, each of its values has a panel. Otherwise there is one panel, or one panel for
-    each series if a common panel would have more curves than colours.
+    If `View.panels` names a parameter, there is a panel for each of its values, for at most `LISTED` values of each
+    series; DataError is raised if a panel would have more curves of several series than there are colours. Without
+    this parameter, there is one panel, or one panel for each of at most `LISTED` series if a common panel would have
+    more curves than colours.
     """
     if view.panels:
         parts, left_out = _by_value(found, view)
@@ -382,7 +387,10 @@ def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
 
 
 def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
-    """Add a coordinate to the data of a curve: the number of realisations over which each mean is taken."""
+    """Return the data of a curve with a coordinate: the number of realisations over which each mean is taken.
+
+    If the output has no realisations, the data are returned unchanged.
+    """
     if "realisation" not in data[output].dims:
         return data
     count = xr.DataArray(aggregation.count(data[output]).variable, attrs={"units": "1"})
@@ -390,7 +398,10 @@ def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the lower edge of a panel, for cases without a value and for cases with failed realisations."""
+    """Return marks at the lower edge of a panel, for the cases that `MARKS` and `SOME` describe.
+
+    The reasons and marks are added to `marked`, for the legend.
+    """
     data = curve.data
     if "status" not in data:
         return []
@@ -415,7 +426,9 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     """Draw an output against two parameters. Cases of a grid are drawn as cells, cases of a sampled study as points."""
     if view.by or (view.panels and len(found) > 1):
-        raise DataError("expected a map of one series, without 'by', because colours show the values")
+        raise DataError(
+            "expected a map without 'by', because colours show the values, and with 'panels' only one series"
+        )
     parts, left_out = _by_series(found)
     if view.panels:
         by_value, left_out = _by_value(found, view)

@@ -23,7 +23,8 @@ from mdr_dask.store import CHECKSUMS, PUBLISHED
 def publish(url: str, target: Path) -> int:
     """Write a study with its campaign, data files and page to one zip, and return the number of files in the zip.
 
-    StoreError is raised if the store is damaged or in use, or if a data file of the campaign has changed since the run.
+    StoreError is raised if the store is damaged or in use, if a data file of the campaign has changed since the run or
+    is missing, or if two data files would have the same name in the zip.
     """
     found = store.verify(url)
     if found.findings:
@@ -72,7 +73,7 @@ def _campaign(url: str, text: str) -> tuple[bytes, dict[str, bytes]]:
 
 
 def _read(file: Mapping[str, str]) -> bytes:
-    """Return the content of a file that a campaign names; raise StoreError if the file has changed since the run."""
+    """Return the content of a file that a campaign names; raise StoreError if it has since changed or is missing."""
     path = Path(file["path"])
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != file["sha256"]:
