@@ -16,7 +16,10 @@ SAME = 1e-5
 
 
 def is_geometric(values: Any) -> bool:
-    """Return whether numbers suit a logarithmic scale: all are positive, and they span more than a decade."""
+    """Return whether numbers suit a logarithmic scale: all are positive, and they span more than a decade.
+
+    Numbers that are not finite are ignored.
+    """
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     return bool(values.size and values.min() > 0 and values.max() > 10 * values.min())

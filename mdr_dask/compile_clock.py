@@ -22,7 +22,10 @@ class CompileClock:
             self._running += 1
 
     def end(self) -> None:
-        """Register the end of a compilation, unless the compilation started before the clock existed."""
+        """Register the end of a compilation.
+
+        Do nothing if no start is registered, because then the compilation started before the clock existed.
+        """
         with self._lock:
             if self._running == 1:
                 self._before += time.perf_counter() - self._since
@@ -35,7 +38,7 @@ class CompileClock:
 
     @property
     def seconds(self) -> float:
-        """Seconds of compilation so far."""
+        """Time in s since the creation of the clock during which at least one thread was compiling."""
         with self._lock:
             return self._before + (time.perf_counter() - self._since if self._running else 0.0)
 

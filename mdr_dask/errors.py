@@ -17,7 +17,7 @@ LISTED = 6
 
 
 class MdrDaskError(Exception):
-    """Base of every error that mdr_dask raises on purpose."""
+    """Base class of the exceptions that mdr_dask defines."""
 
 
 class CampaignError(MdrDaskError):
@@ -28,7 +28,7 @@ class CampaignError(MdrDaskError):
 
 
 class ModelError(MdrDaskError):
-    """A model that does not exist or cannot be loaded."""
+    """A model that does not exist, cannot be loaded, or has a declaration that cannot be used."""
 
 
 class StoreError(MdrDaskError):
@@ -36,11 +36,14 @@ class StoreError(MdrDaskError):
 
 
 class StoreBusyError(StoreError):
-    """A store that is in use by another run."""
+    """A store that another run is using, or a run that has lost its lock on the store."""
 
 
 class ClusterError(MdrDaskError):
-    """A Dask cluster that does not answer, disappears, or has another version of mdr_dask."""
+    """A Dask cluster that cannot be started, does not answer, disappears, or has no workers.
+
+    Also a worker that lacks a module, or has another version of mdr_dask or of the model.
+    """
 
 
 class MachineError(MdrDaskError):
@@ -92,7 +95,8 @@ def did_you_mean(word: Any, known: Sequence[str]) -> str:
 def similar(word: Any, known: Sequence[str]) -> str:
     """Return a hint with one known word, such as `` (did you mean 'hurst'?)``, or an empty text.
 
-    The known word is similar to `word`, or `word` is a common name for it, such as ``mu`` for ``friction``.
+    The known word is similar to `word` or contains it, or `word` is a common name for it, such as ``mu`` for
+    ``friction``. The last part of `word` may also be such a name, as in ``roller_diameter``.
     """
     from difflib import get_close_matches
 
@@ -110,7 +114,7 @@ def similar(word: Any, known: Sequence[str]) -> str:
 
 
 def with_digits(number: float, digits: int) -> str:
-    """Return a number rounded to `digits` significant digits, without trailing zeros.
+    """Return a number rounded to `digits` significant digits (at most 10), without trailing zeros.
 
     The text has an exponent only if the absolute value is at least 1e10, or below 1e-4 but not zero.
     """

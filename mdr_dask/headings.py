@@ -80,7 +80,7 @@ class Column:
 
 
 def plain(name: str) -> str:
-    """Return a name in lower case, with blanks instead of punctuation.
+    """Return a name in lower case, in which single blanks replace blanks and the characters ``_.-:()|``.
 
     A single letter keeps its case, because t is a time and T is a temperature.
     """
@@ -194,8 +194,8 @@ def factors(unit: str, wanted: str) -> tuple[float, float, float]:
     """Return the numbers p, q and z that convert a unit to SI: x in this unit is p (q x + z) in the SI unit `wanted`.
 
     For an angular frequency, p is 2 pi if the unit is Hz, kHz or 1/min (revolutions per minute). Values in 1/s count as
-    values in rad/s, and values in 1/m as values in rad/m. For all other units, p is 1. Raise ValueError if the unit is
-    unknown or has another dimension.
+    values in rad/s, and values in 1/m as values in rad/m. For all other units, p is 1. If `unit` is empty, the values
+    count as SI. Raise ValueError if the unit is unknown or has another dimension.
     """
     if not unit:
         return 1.0, 1.0, 0.0

@@ -1,4 +1,4 @@
-"""One task: compute a block, write it to the store, and return how many results are done, failed or not needed."""
+"""One task: compute a block, write it to the store, and return the number of results in each state."""
 
 from __future__ import annotations
 
@@ -43,7 +43,10 @@ class Work:
     operations: float
 
     def halves(self) -> tuple[Work, ...]:
-        """Return two tasks, each with half of the results, or no tasks if there is only one result."""
+        """Return two tasks, each with half of the wanted results, or no tasks if fewer than two results are wanted.
+
+        The first task also marks the spared results.
+        """
         cells = np.flatnonzero(self.wanted)
         if cells.size < 2:
             return ()
@@ -59,8 +62,9 @@ class Work:
 class Outcome:
     """The return value of a task: counts and times, but no results.
 
-    `counts` has the number of results in each state of `Status`. `compile_seconds` is the part of `compute_seconds` in
-    which this process compiled kernels. `warned` is the number of results that are done but have a warning.
+    `counts` has the number of wanted and spared results in each state of `Status`. `compile_seconds` is the part of
+    `compute_seconds` in which this process compiled kernels. `warned` is the number of results that are done but have a
+    warning.
     """
 
     counts: tuple[int, ...]
@@ -73,12 +77,16 @@ class Outcome:
 
 
 def versions(model: str) -> tuple[str, int, str | None]:
-    """Return the versions of the program and of the model, and a digest of the file of a user's model."""
+    """Return the versions of the program and of the model, and a digest of the file of a user's model or None."""
     return __version__, models.load(model).version, models.imported_digest(model)
 
 
 def run_block(work: Work) -> Outcome:
-    """Compute a block and write it; raise ClusterError if this worker has another version of program or model."""
+    """Compute the wanted results of a block and write the block.
+
+    Raise ClusterError if the versions in this process differ from the versions in the process that started the run.
+    Raise MachineError for a fault of the machine.
+    """
     if versions(work.model) != work.versions:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
@@ -108,7 +116,7 @@ def _other_version(work: Work) -> str:
         for program, model, file in (versions(work.model), work.versions)
     )
     remedy = "install the same on both, and restart the workers"
-    return f"worker {platform.node()} has {here}, this program is {there}; {remedy}"
+    return f"worker {platform.node()} has {here}, but the run was started with {there}; {remedy}"
 
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
@@ -124,9 +132,9 @@ LONGEST_MESSAGE = 1000
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
     """Call the model for a block. If the call raises an exception, call the model again for each result alone.
 
-    A single result for which the model raises an exception is marked as failed. For a fault of the machine,
-    MachineError is raised instead. If the user wrote the model (`is_own`), a fault of the machine also counts as a
-    failed result, and the results are checked.
+    A single result for which the model raises an exception is marked as failed. A fault of the machine is different:
+    MachineError is raised at once. MemoryError is such a fault only if it is raised for a single result. If the user
+    wrote the model (`is_own`), faults of the machine are treated like other exceptions, and the results are checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
@@ -153,10 +161,11 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 
 
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
-    """Return the result of a model that the user wrote, with invalid values marked as failed.
+    """Return the result of a model that the user wrote. Results with invalid values are marked as failed.
 
-    Raise TypeError or ValueError if the result lacks a declared output or has another output, or if a shape or a status
-    is not as declared.
+    Raise TypeError if the model does not return a `Result`. Raise ValueError if the status is invalid, or a key of a
+    message. Unless all results have failed, also raise ValueError if a requested output is missing, or an output is not
+    declared, does not contain real numbers, or does not have the declared shape.
     """
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")
@@ -228,7 +237,10 @@ def _compute_part(
     values: dict[str, NDArray[np.float64]],
     status: NDArray[np.int8],
 ) -> Result:
-    """Compute the wanted results of a block, and insert them into the arrays `values` and `status` of the block."""
+    """Compute the wanted results of a block, and insert them into the arrays `values` and `status` of the block.
+
+    The keys of the messages in the returned result are positions in the whole block.
+    """
     flat_status = status.reshape(wanted.shape)
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:
@@ -323,7 +335,10 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Without computing anything, mark the wanted results of a task as failed."""
+    """Mark the wanted results of a task as failed, with the given message, without computing anything.
+
+    The spared results are marked as not needed.
+    """
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED

@@ -163,7 +163,7 @@ def to_si(value: str, unit: str) -> float:
 
 
 def unit_behind(value: str) -> str:
-    """Return the unit that follows the number in a text, or an empty text if no unit follows."""
+    """Return the unit that follows the number in a text, or an empty text if no known unit follows."""
     match = _QUANTITY.match(value)
     return match[2] if match and match[2] and is_unit(match[2]) else ""
 
@@ -194,7 +194,7 @@ _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
 def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
-    """Return a quantity as text in the unit `written`, or else in a readable unit, as in ``0.5 mm/s``."""
+    """Return a value in the SI unit `unit` as text: in the unit `written`, or else in a readable unit such as mm/s."""
     if written:
         factor, zero = conversion(written, unit)
         return f"{(value - zero) / factor:.{digits}g} {written}"
@@ -240,7 +240,7 @@ def likely(value: float, unit: str, usual: Sequence[str]) -> str:
 
 
 def _decades(value: float, unit: str, usual: str) -> float:
-    """Return the difference in decades between a number in SI and a usual value."""
+    """Return how many decades apart a number in SI and a usual value are; infinity for the number 0."""
     return abs(math.log10(abs(value)) - math.log10(abs(to_si(usual, unit)))) if value else math.inf
 
 
@@ -250,7 +250,10 @@ def example_unit(unit: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a known unit."""
+    """Return whether a text is a known unit, perhaps after a factor, as in ``10^3 um^3``.
+
+    An empty text counts as the unit of pure numbers.
+    """
     unit = _factor_and_unit(text[: 2 * _MOST_LETTERS])[1]
     if not _may_be_unit(unit):
         return False
@@ -329,7 +332,7 @@ _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "curr
 def dimension_of(unit: str) -> tuple[Any, str]:
     """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension.
 
-    Raise ValueError if the unit is unknown. Units with an amount of substance, such as J/mol, are not supported.
+    Raise ValueError if the unit is unknown, and KeyError if it contains an amount of substance, such as J/mol.
     """
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
@@ -363,7 +366,8 @@ def _nearest(word: str, unit: str = "") -> str:
     """Return a hint with a unit in `COMMON` that is similar to `word`.
 
     If `unit` is given, the similar unit must have its dimension. If no unit is similar, the hint names the quantity
-    that is measured in `unit`, or is empty if `unit` is not given.
+    that is measured in `unit`, or is empty if `unit` is not given. For a Rockwell hardness such as ``HRC``, the hint
+    says how to convert it.
     """
     common = COMMON.split()
     if re.match("HR[A-K]", word):

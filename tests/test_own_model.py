@@ -202,7 +202,7 @@ def test_the_law_and_the_figure_of_the_page(example, monkeypatch, capsys):
 def test_a_worker_with_another_file_of_the_model_is_refused(example, monkeypatch):
     others = task.versions("wear_rate:MODEL")[:2]
     monkeypatch.setattr(task, "versions", lambda _: (*others, "other"))
-    with pytest.raises(ClusterError, match=r"wear_rate:MODEL 1 \(file other\), this program is .* \(file [0-9a-f]+\)"):
+    with pytest.raises(ClusterError, match=r"wear_rate:MODEL 1 \(file other\), but the run .* \(file [0-9a-f]+\)"):
         execute.run(mdr_dask.read("pin.yaml"), "pin.zarr", Resources(threads=1), lambda _: None)
 
 

@@ -18,7 +18,10 @@ _EXPECTED = {
 
 
 def load_cluster(path: FilePath) -> dict[str, Any]:
-    """Read a cluster file: the key ``class``, and the optional keys ``arguments``, ``scale`` and ``adapt``."""
+    """Read a cluster file: the key ``class``, and the optional keys ``arguments``, ``scale`` and ``adapt``.
+
+    Raise CampaignError if the file cannot be read or contains mistakes.
+    """
     document = parse(read_text(path), str(path))
     data = document.data if isinstance(document.data, dict) else {}
     for key, value in data.items():

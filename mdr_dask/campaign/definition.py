@@ -35,7 +35,7 @@ class Spread:
     whole: bool
 
     def at(self, shares: Any) -> list[float]:
-        """Return the value at each fraction of the interval: 0 gives `low`, 1 gives `high`."""
+        """Return the rounded value (see `tidy`) at each fraction of the interval: 0 gives `low`, 1 gives `high`."""
         if self.geometric:
             values = self.low * (self.high / self.low) ** shares
         else:
@@ -122,6 +122,7 @@ class Refinement:
     spread: Spread
     # Largest interpolation error of each output. A relative error refers to the largest absolute value along the axis.
     until: Mapping[str, Tolerance]
+    # Largest number of values of the axis, for each combination of values of the non-adaptive axes.
     at_most: int
 
 
@@ -150,7 +151,8 @@ class Campaign:
     seed: int
     replication: Replication
     series: tuple[Series, ...]
-    # The outputs to compute and store, in the order in which the model declares them, with their companions.
+    # The outputs to compute and store, in the order in which the model declares them. Each output is followed by its
+    # companion, unless the campaign has ``errors: false``.
     outputs: tuple[str, ...]
     # Largest accepted discretisation error of every output, relative to its value. None if the file sets no accuracy.
     accuracy: float | None

@@ -263,7 +263,10 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return `data`, with the checked values from `base` for all parameters that are not in `varied`."""
+    """Return `data`, with the checked values from `base` for all parameters that are not in `varied`.
+
+    If `base` is None, no value is replaced.
+    """
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

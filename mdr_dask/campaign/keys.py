@@ -21,8 +21,9 @@ from mdr_dask.models.base import Model
 def of_keys(source: Mapping[str, Any]) -> Campaign:
     """Read a campaign from a dictionary with the keys of a campaign file.
 
-    Values may also be paths, Python ranges, pint quantities, and arrays and numbers of numpy, pandas or xarray. Numbers
-    of numpy are rounded to 14 digits, so that ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
+    Without the key ``name``, the campaign is called ``study``. Values may also be paths, Python ranges, pint
+    quantities, and arrays and numbers of numpy, pandas or xarray. Numbers of numpy are rounded to 14 digits, so that
+    ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
     """
     keys = {str(key): _written(str(key), value) for key, value in source.items()}
     try:

@@ -34,8 +34,9 @@ ZERO = "the fit needs standard errors above 0: delete the column of errors, so t
 class Measured:
     """Measured points in SI. Each array has the shape (points,).
 
-    `errors` are the standard errors of `values`, and `error_column` describes the column of errors. The keys of
-    `conditions` are names of coordinates of the store. `remark` names unused columns, and counts rows without a number.
+    `errors` are the standard errors of `values`, or None if the table has no column of errors. `error_column` describes
+    this column. The keys of `conditions` are names of coordinates of the store. `remark` names unused columns, and
+    counts rows without a number.
     """
 
     source: str
@@ -273,7 +274,7 @@ def _sentences(found: Measured, model: str, series: Series) -> Iterator[str]:
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest value of each condition in a study, also of parameters that do not vary."""
+    """Return the smallest and the largest value of each condition in a series, also of parameters that do not vary."""
     held = {key: (value, value) for key, (value, _, _) in numbers_of(series.parameters).items()}
     coordinates = models.load(name).coordinates(series.parameters)
     held |= {key: (float(each.values.min()), float(each.values.max())) for key, each in coordinates.items()}

@@ -207,8 +207,9 @@ def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return the message about an unknown key.
 
-    If the key has been renamed, the message contains the new name. If the key belongs in a mapping inside or outside
-    this one, the message says where. In all other cases, the message suggests a similar key or lists the known keys.
+    If the key has been renamed or removed, the message says what to write instead. If the key belongs in a mapping
+    inside or outside this one, the message says where. In all other cases, the message suggests a similar key or lists
+    the known keys.
     """
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])

@@ -61,7 +61,7 @@ class Problems:
 
 
 def dotted(path: Iterable[str | int]) -> str:
-    """Return ``outputs[1]`` for ``("outputs", 1)``."""
+    """Return a path as text, such as ``outputs[1]`` for ``("outputs", 1)``."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part

@@ -103,7 +103,11 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is ignored. A column of numbers is not ignored if its heading resembles a parameter."""
+    """Return whether a column is ignored, because its heading does not begin with the name of a parameter.
+
+    A column with numbers is not ignored if its heading resembles the name of a parameter, so that the mistake is
+    reported.
+    """
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

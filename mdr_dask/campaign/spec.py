@@ -50,8 +50,8 @@ class RefinedSpec(Parameters):
 
     adaptive: list[Any] = Field(description="first and last value of the axis")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(
-        description="largest accepted interpolation error: 1 % allows 1 % of the largest value of the first "
-        "output with a single number for each case; "
+        description="largest accepted interpolation error: 1 % allows 1 % of the largest absolute value along the "
+        "axis, for the first output with a single number for each case; "
         "{friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}} sets the error of each named output"
     )
     at_most: Whole = Field(
@@ -160,8 +160,8 @@ class CampaignSpec(Parameters):
         1, description="number of random samples of each case, such as independent rough lines with the same statistics"
     )
     parameters: dict[str, Any] = Field(
-        description="parameters of the model. A list, {linear: [a, b, n]}, {geometric: [a, b, n]} or {values: [...]} "
-        "varies a parameter"
+        description="parameters of the model. A list, {linear: [a, b, n]}, {geometric: [a, b, n]}, {values: [...]} or "
+        "{adaptive: [a, b], until: 1 %} varies a parameter"
     )
     series: dict[FileName, dict[str, Any]] | None = Field(
         None,

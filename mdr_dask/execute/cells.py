@@ -36,7 +36,7 @@ class Cells:
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the number of operations that the round needs for a block."""
+        """Return the approximate number of operations that the round needs for a block."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.operations(index) if part else 0.0
 
@@ -54,8 +54,9 @@ def find_cells(
 
     `asked` marks the cases of the stage. `needed` marks the cases that need the realisations of the round. These
     realisations are ``realisations[0]`` to ``realisations[1] - 1``. The round also computes earlier realisations of the
-    needed cases that have the state "not needed" in the ledger. `own` marks the results that belong to this part of
-    the campaign; None means all results.
+    needed cases that have the state "not needed" in the ledger. If `retry_failed` is true, results of the round that
+    failed or did not converge are computed again. `own` marks the results that belong to this part of the campaign;
+    None means all results.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -84,7 +85,10 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
 
 
 def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
-    """Yield the tasks of a round one by one, to save memory."""
+    """Yield the tasks of a round one by one, to save memory. From time to time, merge the records of blocks.
+
+    Raise StoreError if the store has been removed.
+    """
     laid_out = store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: the store has been removed")

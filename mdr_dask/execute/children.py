@@ -80,7 +80,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model. At the end wait until the children end; after an exception kill them."""
+    """Start `count` child processes for a model. At the end wait until they end; after an exception kill them."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     path = os.pathsep.join(str(Path(folder).absolute()) for folder in sys.path)
@@ -177,7 +177,7 @@ def _compute_blocks(pipe: Connection) -> None:
 
 @contextmanager
 def _limited(limit: float | None) -> Iterator[None]:
-    """Raise TimeoutError if a case of a plain Python model takes too long."""
+    """Within the context, raise TimeoutError if a case of a plain Python model takes longer than `limit` seconds."""
     from mdr_dask.models import per_case
 
     def alarm(_number: int, _frame: FrameType | None) -> None:

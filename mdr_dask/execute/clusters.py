@@ -26,7 +26,8 @@ from mdr_dask.task import one_blas_thread
 
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
-#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time.
+#: Dask starts as many workers in an adaptive cluster as are needed to finish all waiting tasks in this time, up
+#: to the maximum in the cluster file.
 TARGET_DURATION = "1s"
 #: Loggers whose messages explain why workers cannot be started. Messages of the run quote the newest message of these
 #: loggers.
@@ -57,7 +58,7 @@ class _LastMessage(logging.Handler):
 
 @contextmanager
 def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
-    """Start a cluster or connect to a running cluster, and yield a task window on the workers of the cluster."""
+    """Start a cluster, connect to a running cluster or use the given client, and yield a task window on the workers."""
     message = _LastMessage(logging.ERROR)
     with ExitStack() as stack:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
@@ -161,7 +162,8 @@ def cluster_class(name: str) -> type[Cluster]:
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
     """Add arguments that protect a cluster from other users: TLS, and a web page that only this machine can open.
 
-    Only clusters on this machine and clusters of batch jobs get these arguments.
+    Only clusters on this machine and clusters of batch jobs get these arguments. Arguments in the cluster file take
+    precedence; ``security: false`` turns TLS off.
     """
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
@@ -189,7 +191,7 @@ def _in_files(keys: Security, folder: Path) -> Security:
 
 
 def _most(plan: Mapping[str, Any]) -> int:
-    """Return the largest number of threads that the cluster file allows; 0 if the file states no limit."""
+    """Return the largest number of threads of an adaptive cluster; 0 without a maximum and for other clusters."""
     arguments = plan.get("arguments", {})
     adapt = plan.get("adapt", {})
     each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)

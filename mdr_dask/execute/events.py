@@ -64,7 +64,8 @@ class Progress:
     # Number of blocks and number of solutions that this run has computed. Several results may share a solution.
     blocks: int = 0
     solves: int = 0
-    # Number of operations: of all rounds that have begun (`estimated`), and of the finished blocks (`finished`).
+    # Approximate number of operations of the results that this run computes: in all rounds that have begun
+    # (`estimated`), and in the finished blocks (`finished`).
     estimated: float = 0.0
     finished: float = 0.0
     # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the

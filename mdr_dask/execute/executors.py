@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 class Executor(AbstractContextManager["Executor"]):
     """Compute blocks on the given resources.
 
-    The blocks of a plain Python model are computed in child processes unless `Resources.threads` is given, because only
-    one thread of a process can run Python at a time, and because a crash would end the run.
+    Without a cluster, the blocks of a plain Python model are computed in child processes unless `Resources.threads` is
+    given, because only one thread of a process can run Python at a time, and because a crash would end the run. With
+    `Resources.workers` or `Resources.case_timeout`, the blocks of all models are computed in child processes. On a
+    system that cannot fork, threads compute all blocks.
     """
 
     def __init__(self, resources: Resources, model: str, tell: Tell) -> None:

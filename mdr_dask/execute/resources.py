@@ -14,8 +14,11 @@ class Resources:
     `threads` is the number of threads, and `workers` the number of child processes. Models in plain Python use child
     processes instead of threads, unless `threads` is given. `scheduler` is the address of a running Dask scheduler.
     `cluster` is a description from `mdr_dask.campaign.cluster.load_cluster`. `client` is a Dask client, which the run
-    does not close. A run on a cluster ends with an error after `patience` seconds without any worker. If `case_timeout`
-    is given, a result that takes longer than this time in s fails, and blocks are computed in child processes.
+    does not close. A run on a cluster ends with an error after `patience` seconds without any worker.
+
+    If `case_timeout` is given, blocks are computed in child processes, and a result of a plain Python model that takes
+    longer than this time in s fails. For other models, only blocks are timed: a block that takes longer than this time
+    multiplied by the number of its results is halved, or fails if it has a single result.
     """
 
     threads: int | None = None

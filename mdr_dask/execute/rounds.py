@@ -1,8 +1,9 @@
 """Run a campaign stage after stage and round after round, until no result is missing in the store.
 
 A stage is the campaign with the present values of all adaptive axes. The first round of a stage computes the first
-realisations of all cases. Further rounds add realisations to cases whose standard errors are too large. The stored
-results determine the next stage and round. A run can therefore be stopped and repeated at any time.
+realisations of all cases that earlier stages lack. Further rounds add realisations to cases whose standard errors are
+too large. The stored results determine the next stage and round. A run can therefore be stopped and repeated at any
+time.
 """
 
 from __future__ import annotations
@@ -40,8 +41,9 @@ def run(
 ) -> Progress:
     """Compute the results of a campaign that are missing in the store, and return the final progress.
 
-    `report` receives the progress after every block. `tell` receives every event, from any thread. With a `part`, only
-    the blocks of this part are computed and counted. Other parts may run at the same time.
+    If `retry_failed` is true, results that failed or did not converge are computed again. `report` receives the
+    progress at the start of every round and after every block. `tell` receives every event, from any thread. With a
+    `part`, only the blocks of this part are computed and counted. Other parts may run at the same time.
     """
     models.require_current(campaign.model)
     stored_layout(Stage.first(campaign), url)  # an error is raised here, before anything is locked
@@ -165,7 +167,7 @@ class _Run:
         return _Round(layout, asked, needed, (before, count))
 
     def laid_out(self, layout: tuple[Template, ...], count: int) -> tuple[Template, ...]:
-        """Lay out a study for `count` realisations, unless this was done before."""
+        """Lay out a study for at least `count` realisations, unless this was done before; return the layout."""
         sizes = [{**t.sizes, "realisation": max(t.sizes["realisation"], count)} for t in layout]
         layout = tuple(replace(template, sizes=each) for template, each in zip(layout, sizes, strict=True))
         if not store.is_laid_out(self.url, layout):

@@ -1,4 +1,4 @@
-"""For campaigns with adaptive axes: find the cases of a stage in the store, and choose the values of the next stage."""
+"""Find the cases of a stage in the store, and choose the values of adaptive axes for the next stage."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def following(
 ) -> tuple[Stage | None, Event]:
     """Return the stage that follows a finished stage (None after the last stage), and an event.
 
-    The event holds the number of values on each adaptive axis. Only the first `realisations` realisations are used.
+    The event contains the number of values on each adaptive axis. After the last stage, its message names the axes
+    along which interpolation misses a tolerance. Only the first `realisations` realisations are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}

@@ -35,10 +35,11 @@ Outcomes = list[tuple[Work, Outcome]]
 class TaskWindow:
     """The blocks that are submitted to a cluster at the same time: about twice as many as the cluster has threads.
 
-    The run ends with an error after `patience` seconds without any worker. A block that takes longer than
-    `case_timeout` seconds is halved, and a single result that takes longer fails. `most` is the largest number of
-    threads of an adaptive cluster. For other clusters, `most` is 0. The function `replace_lost`, if given, replaces
-    lost workers. The function `last_message` returns the last error message of the cluster.
+    For an adaptive cluster, `most` is the largest number of threads, and about ``2 * most`` blocks are submitted. For
+    other clusters, `most` is 0. The run ends with an error after `patience` seconds without any worker. `case_timeout`
+    is the time limit in s for each result (see `mdr_dask.execute.resources.Resources`), or None. The function
+    `replace_lost`, if given, replaces lost workers. The function `last_message` returns the last error message of the
+    cluster.
     """
 
     def __init__(
@@ -111,7 +112,11 @@ class TaskWindow:
         future.add_done_callback(self._ended.put)
 
     def _check(self) -> None:
-        """Raise ClusterError if the scheduler has disappeared or there was no worker for too long."""
+        """Count the threads of the cluster, and replace lost workers.
+
+        Raise ClusterError if the scheduler has disappeared, if the cluster reports an error before its first worker
+        starts, or if there was no worker for too long.
+        """
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
         if self._replace_lost is not None:
@@ -147,7 +152,10 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the outcomes of a task, or None if workers died. Turn other known errors into a ClusterError."""
+    """Return the outcomes of a task, or None if workers died. Turn other known errors into a ClusterError.
+
+    Raise TimeoutError if the outcomes do not arrive within `PAUSE` seconds.
+    """
     from concurrent.futures import CancelledError
 
     try:

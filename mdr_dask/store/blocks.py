@@ -42,7 +42,7 @@ class Place:
     index: BlockIndex
     # The part of the ledger that the block fills: one slice for each dimension, the last one for ``realisation``.
     region: tuple[slice, ...]
-    # The digest of the layout when the run began (`layout_mark`). A worker that finds another layout raises
+    # The digest of the layout when the round began (`layout_mark`). A worker that finds another layout raises
     # StoreError.
     layout: str
     lock: Lock

@@ -86,7 +86,10 @@ def absolute(url: str) -> str:
 
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
-    """Turn errors of the file system or the network into a StoreError with the store, the action and the cause."""
+    """Turn errors of the file system, the network or a file's content into a StoreError.
+
+    The message contains the store, the action and the cause.
+    """
     try:
         yield
     except MdrDaskError:
@@ -116,7 +119,7 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
 
 
 def parsed(content: bytes) -> Any:
-    """Return the content of a JSON text; raise ValueError if the text is not JSON."""
+    """Return the content of a JSON text; raise ValueError if the text is not JSON or is nested too deep."""
     try:
         return json.loads(content)
     except RecursionError:

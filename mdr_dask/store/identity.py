@@ -30,7 +30,8 @@ log = logging.getLogger("mdr_dask.store")
 class Stored:
     """A campaign whose axes also have the values that a store already contains."""
 
-    # The campaign to lay out. Each axis has first the stored values, then the new values.
+    # The campaign to lay out. Each axis has first the stored values, then the new values. The outputs are those of the
+    # store.
     campaign: Campaign
     # Chunk lengths of the stored groups, by the names of their series.
     chunks: Mapping[str, Mapping[str, int]]
@@ -155,8 +156,9 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
 def block_digests(attributes: Mapping[str, Any]) -> Callable[[Sequence[Sequence[int]]], str]:
     """Return a function that gives the digest of the campaign for each block of a group with these attributes.
 
-    The argument of the function is the region of the block: start and stop along each dimension. The digest contains
-    everything on which the results of the block depend. It does not change if the store is extended.
+    The argument of the function is the region of the block: start and stop along each dimension. The digest depends
+    on the model and its version, the seed, the accuracy, the lengths of blocks, the fixed parameters, and the values of
+    the axes in the block. It does not change if the store is extended.
     """
     axes = attributes["axes"]
     dims = list(dict.fromkeys(axis["dim"] for axis in axes))
@@ -176,7 +178,7 @@ def block_digests(attributes: Mapping[str, Any]) -> Callable[[Sequence[Sequence[
 def of_other_campaign(record: Mapping[str, Any], digests: Callable[[Sequence[Sequence[int]]], str]) -> bool:
     """Return whether the record of a block belongs to another campaign.
 
-    Return False for older records, which do not name their campaign.
+    Return False for records without a digest of the campaign, as earlier versions of mdr_dask wrote them.
     """
     return "campaign" in record and record["campaign"] != digests(record["region"])
 

@@ -52,7 +52,8 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
     Files are written in this order: the record of the layout with the digests of all other files; coordinates and
     metadata of arrays; metadata of groups; finally ``zarr.json``. In a new store, a ``zarr.json`` without arrays is
-    written before them (see `mdr_dask.store.study.only_claimed`).
+    written before all these files (see `mdr_dask.store.study.only_claimed`). If the store already has the shape and the
+    attributes of the templates, ``zarr.json`` does not change, and missing or damaged files are written again.
     """
     held = document(url)
     if held is None:
@@ -126,12 +127,12 @@ def _by_content(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def is_file(value: Any) -> bool:
-    """Return whether a stored value is a data file."""
+    """Return whether a stored value describes a data file."""
     return isinstance(value, Mapping) and value.keys() == DataFile.model_fields.keys()
 
 
 def of_files(value: Any, key: str) -> Any:
-    """Return a value in which each file is replaced by its digest (`key` is ``sha256``) or by its name.
+    """Return a value in which each file is replaced by its digest (`key` is ``sha256``) or by its name (``name``).
 
     Studies are compared by digests, because a study whose files were moved is still the same study.
     """
@@ -148,7 +149,7 @@ def group_names(members: Mapping[str, Any]) -> list[str]:
 
 
 def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the contents of the metadata files of all groups and arrays, computed from the metadata of the study."""
+    """Return the contents of the metadata files of all groups and arrays below the root, from the root's metadata."""
     members = root["consolidated_metadata"]["metadata"]
     names = group_names(members)
     groups = {name: group_document(members_of(members, name), members[name]["attributes"]) for name in names}
@@ -197,9 +198,9 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment that says how to open a study with series, which looks empty if it is opened as one dataset.
+    """Return the attribute ``comment`` of a study with series, which says how to open the study.
 
-    Without series, the returned dictionary is empty.
+    Such a study looks empty if it is opened as one dataset. Without series, the returned dictionary is empty.
     """
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
@@ -268,7 +269,7 @@ def _compressors() -> list[Any]:
 
 
 def _coordinates(template: Template) -> dict[str, _Coordinate]:
-    """Return dims, values and attrs of every coordinate: axes, realisation, further dimensions, fixed parameters."""
+    """Return dims, values and attrs of every coordinate: axes, realisation, further dimensions, fixed numbers."""
     found: dict[str, _Coordinate] = {}
     for axis in template.series.axes:
         values = np.array(axis.labels or axis.values, dtype=object if axis.labels else None)

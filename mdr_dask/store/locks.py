@@ -102,7 +102,10 @@ class Part:
 
 @contextmanager
 def exclusive(url: str) -> Iterator[Lock]:
-    """Lock a study for one run; raise StoreBusyError if another run or a part is active."""
+    """Lock a study for one run; raise StoreBusyError if another run or a part is active.
+
+    Remove the temporary files, and the lock files of parts, that earlier runs have left.
+    """
     with ExitStack() as held:
         with gate(url):
             parts = _parts(url)
@@ -138,7 +141,10 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
 
 @contextmanager
 def gate(url: str) -> Iterator[None]:
-    """Hold the gate of a study: the lock that every run needs to start and to lay out the study."""
+    """Hold the gate of a study: the lock that every run needs to start and to lay out the study.
+
+    If another process holds the gate, wait.
+    """
     start, is_reported = time.monotonic(), False
     with ExitStack() as held:
         while True:
@@ -271,7 +277,10 @@ def _locked(file: Path) -> int:
 
 
 def _flock(descriptor: int, shared: bool = False) -> None:
-    """Acquire a lock of the operating system, or raise BlockingIOError if another process holds the lock."""
+    """Acquire a lock of the operating system, or raise BlockingIOError if another process holds the lock.
+
+    Raise OSError if the operating system or the file system has no locks.
+    """
     if fcntl is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
@@ -361,7 +370,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 def _retire(url: str, name: str) -> None:
     """Remove the runner files of a lock. Before this, wait until tasks that have locked these files finish writing.
 
-    Raise StoreBusyError if a task has not finished after 2 `BEAT`.
+    Raise StoreBusyError if a task has not finished after twice the time `BEAT`.
     """
     give_up = time.monotonic() + 2 * BEAT
     for runner in _runners(url, name):
@@ -435,7 +444,10 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim has recently written a heartbeat, or writes one while this function waits."""
+    """Return whether the owner of a claim has recently written a heartbeat, or writes one while this function waits.
+
+    If the claim has just been removed, return True, because another run may have started.
+    """
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _claim(name, number, "life")) or claim
     if time.time() - last.get("time", 0.0) <= 2 * BEAT:
@@ -450,7 +462,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
 def _read_claim(url: str, name: str) -> dict[str, Any]:
     """Return the content of a claim or a heartbeat, or an empty dictionary if the file is missing.
 
-    An incomplete file counts as missing on a disk; at a URL it raises StoreError.
+    On a disk, a file that is incomplete or cannot be read counts as missing; at a URL it raises StoreError.
     """
     try:
         return read_json(url, name) or {}

@@ -53,7 +53,7 @@ def verify_packed(path: Path) -> Inspection:
 def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
     """Return the expected checksum of every file in a zip."""
     if CHECKSUMS not in packed.namelist():
-        raise StoreError(f"{path}: a zip without {CHECKSUMS}, expected one that 'mdr-dask publish' wrote")
+        raise StoreError(f"{path}: expected a zip that 'mdr-dask publish' wrote, got one without {CHECKSUMS}")
     lines = packed.read(CHECKSUMS).decode("utf-8", "replace").splitlines()
     found = {name: checksum for checksum, _, name in (line.partition("  ") for line in lines)}
     if not all(name and len(checksum) == 64 for name, checksum in found.items()):

@@ -27,8 +27,9 @@ LAZY_BYTES = 2**30
 def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not. Return the groups, indexed by the names of the series.
 
-    The values of numeric axes are in ascending order. The group of a study without series has the name ``""``, or
-    ``"-"`` if an earlier mdr_dask has added series to the study. Groups larger than `LAZY_BYTES` contain Dask arrays.
+    In a grid, the values of numeric axes are in ascending order; along the dimension ``case``, the stored order is
+    kept. The group of a study without series has the name ``""``, or ``"-"`` if an earlier version of mdr_dask has
+    added series to the study. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
     names = series_names(url)
     require_undamaged(url, names)
@@ -74,7 +75,10 @@ def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``. Lazy arrays are written piece by piece."""
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``. Lazy arrays are written piece by piece.
+
+    An existing file is replaced. Raise StoreError if the packages for netCDF are not installed.
+    """
     plain = with_plain_attributes(dataset)
     if path.suffix == ".nc":
         if not (find_spec("h5netcdf") and find_spec("h5py")):

@@ -31,7 +31,7 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 
 
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
-    """Return the metadata of a group from ``zarr.json``, or None if the group does not exist.
+    """Return the metadata of a group from ``zarr.json``, or None if there is no study or no such group.
 
     The returned metadata are cached: do not change the metadata. Raise StoreError if the metadata are damaged,
     or if it is not safe to open the arrays.
@@ -47,7 +47,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=32)
 def _checked(url: str, content: bytes) -> dict[str, Any] | None:
-    """Return the metadata of a study, or None if they are no JSON, unsafe, or not in the record of the layout."""
+    """Return the metadata of a study, or None if they are not JSON, unsafe, or not in the record of the layout."""
     try:
         root = parsed(content)
     except ValueError:
@@ -144,7 +144,10 @@ def is_study(url: str) -> bool:
 
 
 def _root_attributes(url: str) -> dict[str, Any] | None:
-    """Return the attributes of the Zarr group at a path or URL, or None if there is no group."""
+    """Return the attributes of the Zarr group at a path or URL, or None if there is no group.
+
+    Raise StoreError if a study has lost its ``zarr.json``, or if this file is damaged.
+    """
     found = document(url)
     if found is None and read_bytes(url, RECORD) is not None:
         raise StoreError(f"{url}: zarr.json is missing; 'mdr-dask verify --repair {url}' writes it again")
@@ -176,7 +179,10 @@ def attributes(url: str) -> dict[str, Any]:
 
 
 def series_names(url: str) -> list[str]:
-    """Return the names of the groups of a study: ``""`` for the root, or `ROOT` if the study also has series."""
+    """Return the names of the groups of a study.
+
+    If the root contains results, its name is ``""``, or `ROOT` if the study also has series.
+    """
     root = "axes" in attributes(url)
     members = (document(url) or {})["consolidated_metadata"]["metadata"]
     names = [name for name, member in members.items() if member["node_type"] == "group"]

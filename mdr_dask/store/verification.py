@@ -80,9 +80,9 @@ def verify(url: str) -> Inspection:
 def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Damaged or missing metadata are written again. Damaged coordinates, blocks and records are removed; the next run
-    writes the coordinates and computes the blocks again. Foreign files are removed only from the folders of chunks and
-    records.
+    Damaged or missing metadata are written again. Damaged coordinates, damaged records, damaged blocks and blocks of
+    another campaign are removed; the next run writes the coordinates and computes the blocks again. Foreign files are
+    removed only from the folders of chunks and records. Raise StoreBusyError if a run is active in the store.
     """
     refuse_file(url)
     with exclusive(url):
