@@ -181,7 +181,7 @@ def spelt(value: str) -> str:
 
 def expected(unit: str, usual: str = "") -> str:
     """Return the name of a quantity with an example, as in ``a length (such as '20 mm')``."""
-    spaced = unit.replace("*", " ").replace("**", "^")
+    spaced = unit.replace("**", "^").replace("*", " ")
     other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
     name, example = _MEANINGS.get(spaced) or other
     example = usual or example
@@ -324,15 +324,24 @@ def converts(given: str, unit: str) -> bool:
     return bool(given)
 
 
-#: Coherent SI unit of each base dimension in `DEFINITIONS` except the amount of substance.
-_COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
+#: Coherent SI unit of each base dimension in `DEFINITIONS`.
+_COHERENT = {
+    "length": "m",
+    "mass": "kg",
+    "time": "s",
+    "temperature": "K",
+    "current": "A",
+    "angle": "rad",
+    "substance": "mol",
+    "luminosity": "cd",
+}
 
 
 @lru_cache(maxsize=1024)
 def dimension_of(unit: str) -> tuple[Any, str]:
     """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension.
 
-    Raise ValueError if the unit is unknown, and KeyError if it contains an amount of substance, such as J/mol.
+    Raise ValueError if the unit is unknown.
     """
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
