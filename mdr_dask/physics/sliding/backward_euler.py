@@ -7,8 +7,10 @@ nodes. The forces are sums over the nodes:
     F_N / (4 G dx) = sum of u_i
     F_x / (4 G) = sum of (w_i - w_(i-1)) (u_i - lambda u_(i-1)) / (1 - lambda)
 
-Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In all other blocks, one vector
-instruction treats several cases.
+On a line that is not periodic, the sum of u_i also includes the free recovery beyond the last node.
+
+If bounds show that a block of nodes is entirely in contact or entirely free in a case, the sums over the block have
+closed forms. In all other blocks, one vector instruction treats several cases.
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ LANES = 8  # number of cases in one vector instruction: the widest vector regist
 
 # Rows of `Lanes.sums`, and the number of these rows
 CARRIED, STIFFNESS, DRAG, SUMS = range(4)
-# Columns of `Nodal.blocks`: largest and smallest height, steepest fall (a negative rise), height before the block, and
-# the sums of height, rise, height times rise, and rise squared over the nodes of the block
+# Columns of `Nodal.blocks`: largest and smallest height, smallest rise (negative if the line falls), height before the
+# block, and the sums of height, rise, height times rise, and rise squared over the nodes of the block
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 # Rows of `Lanes.state`, and their number. U is the displacement u, and FADE is du/d(depth). THROUGH is the factor by
 # which u decays over a free block. MEMORY is the sum of u over a free block if u is 1 just before the block. LOAD, RATE
@@ -61,10 +63,11 @@ class Moving(NamedTuple):
 class Lanes(NamedTuple):
     """Work arrays of a sweep.
 
-    `state`, shape (ROWS, cases), contains the rows `U` to `LOSS`. After the sweep, the rows `U` and `FADE` contain u
-    and du/d(depth) at the end of the line. `packed` contains copies of state, decay and depth of the cases in the
-    queue, one column per case. `queue` contains the indices of the cases in which contact begins or ends in the current
-    block. `sums`, shape (SUMS, cases), contains the sum of u, the sum of du/d(depth), and (1 - lambda) F_x / (4 G).
+    `state`, shape (ROWS, cases), has the rows `U` to `LOSS`, of which the last three are used only in `packed`. After
+    the sweep, the rows `U` and `FADE` contain u and du/d(depth) at the end of the line. `queue` contains the indices of
+    the cases in which contact may begin or end in the current block. `packed` has one column for each case in the
+    queue, with the same rows as `state` (`THROUGH` and `MEMORY` are not used), followed by decay and depth. `sums`,
+    shape (SUMS, cases), contains the sum of u, the sum of du/d(depth), and (1 - lambda) F_x / (4 G).
     """
 
     state: FloatArray
@@ -99,9 +102,10 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 @jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
-    """Add the sums of a block in all cases in which the block is entirely in contact or entirely free.
+    """Add the sums of a block in all cases in which bounds show that it is entirely in contact or entirely free.
 
-    Write the indices of all remaining cases to the queue, and return the number of remaining cases.
+    In these cases, also update u and du/d(depth) to the end of the block. Write the indices of all remaining cases to
+    the queue, and return the number of remaining cases.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -179,7 +183,8 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Move one element of every case along the line, and write the sums.
 
-    Elements start in contact at the highest node of a periodic line, or undeformed at the first node of any other line.
+    Elements start in contact at the highest node of a periodic line, or undeformed before the first node of any other
+    line.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -211,9 +216,10 @@ def _newton(
 ) -> None:
     """Find the depth and the drag of every case, and replace the guesses in `depths` by the solutions.
 
-    Newton's method approaches the solution from above, because the load is a convex, increasing function of the depth.
-    The drag is extrapolated from the last two sweeps to the final depth. If no depth is found, the guess is kept and
-    the drag is NaN. `outside` receives whether an end of a line that is not periodic is in contact.
+    After the first step, Newton's method approaches the solution from above, because the load is a convex, increasing
+    function of the depth. The drag is extrapolated from the last two sweeps to the final depth. `outside` receives
+    whether an end of a line that is not periodic is in contact. If no depth is found, the drag is NaN, and the entries
+    of the case in `depths` and `outside` are not changed.
     """
     count = depths.size
     active, before = np.arange(count), np.full((2, count), np.nan)
@@ -258,7 +264,10 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """Write the number of nodes in contact to `touched`, and the rms rise at these nodes to `slope`, for every case."""
+    """Write, for every case, the number of nodes in contact to `touched`, and the rms rise to these nodes to `slope`.
+
+    The rise to a node is counted from the previous node. Without a node in contact, `slope` is 0.
+    """
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -280,8 +289,9 @@ def steady_by_steps(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return for each case the penetration of the highest node, F_x / (4 G), and whether an end is in contact.
 
-    If no depth is found, F_x / (4 G) is NaN. A periodic line must end at the highest node, and never has an end in
-    contact. Deborah numbers are v tau / dx. Loads are F_N / (4 G dx), in the unit of height.
+    Heights are relative to the highest node. Deborah numbers are v tau / dx. Loads are F_N / (4 G dx), in the unit of
+    height. A periodic line must end at the highest node, and the third result is then False. If no depth is found, the
+    second result is NaN, and the first is only a guess.
     """
     depths = first_depths(loads / height.size)
     drags, outside = np.empty(loads.size), np.zeros(loads.size, np.bool_)

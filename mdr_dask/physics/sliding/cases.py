@@ -1,4 +1,4 @@
-"""Cases of steady sliding on one line (the input of every solver), and steady states (the output)."""
+"""Cases of steady sliding on one line (the input of the solvers), and steady states (the output)."""
 
 from __future__ import annotations
 

@@ -24,7 +24,10 @@ from mdr_dask.physics.surfaces.waves import series
 
 
 def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
-    """Return the steady states of the cases in full contact with a plane. All other cases get `Outcome.INVALID`.
+    """Return the steady states of the cases that are certainly in full contact with a plane.
+
+    All other cases get `Outcome.INVALID`. These include some cases in which contact is barely full, because the
+    pressure between the nodes is known only from a bound.
 
     `terms` contains the pair (G_m / G_inf, tau_m v / L) for each Prony term, and is empty for a Kelvin solid. The
     Deborah number of a case is eta v / (G_inf L), where eta is the viscosity of the dashpot. The load, in the unit of

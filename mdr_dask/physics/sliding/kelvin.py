@@ -2,7 +2,7 @@
 
 The unit of length is the cell width, a slope is the rise over one cell, and ``deborah`` is the distance v tau in cell
 widths. Heights are measured from the highest point of the line, so that the penetration is w = depth + height with
-depth > 0. The displacement of an element is u = w in contact. At the distance s behind the place where contact ends, u
+depth > 0. The displacement of an element is u = w in contact. At the distance s beyond the place where contact ends, u
 and du/d(depth) have decayed by the factor exp(-s / deborah). If the depth changes, contact begins and ends at slightly
 shifted places. The effect of this shift on the load is of second order.
 """
@@ -43,6 +43,8 @@ def blocks_of(cells: Cells) -> Blocks:
 
 class Barriers(NamedTuple):
     """Limits of the depth for each cell and each block, at one Deborah number.
+
+    After a velocity jump, the lift (depth plus rate of the depth) takes the place of the depth.
 
     At depths above the entry in `cell`, the force on elements in contact is positive everywhere in the cell. The entry
     in `block` is the same limit for a whole block, or NaN until the limits of the cells in the block are computed. At
@@ -155,6 +157,8 @@ class FreeElement(NamedTuple):
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
     """Return the position x between `low` and `high` where the line reaches a free element.
 
+    If the line is not below the element at `low`, `low` is returned.
+
     The displacement of the element is u exp(-(x - start) / deborah). At `high`, the penetration w must exceed this
     displacement.
     """
@@ -216,11 +220,11 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return the contributions of a free recovery to load and drag, each followed by its derivative by the depth.
+    """Return the contributions of a free recovery to load and drag, each followed by the derivative d/d(depth).
 
     The load is the integral of u. The recovery begins with the displacement u, and extends over the distance
-    `travelled`. The derivative of the drag
-    includes the shift of the place where contact begins again. At this place, the line has the slope `slope`.
+    `travelled`. The derivative of the drag includes the shift of the place where contact begins again. At this place,
+    the line has the slope `slope`.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -231,7 +235,10 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells from cell i on in which a free element stays free. Return the next cell, and u at its start."""
+    """Skip cells, beginning with cell i, in which a free element certainly stays free.
+
+    Return the first cell that is not skipped, and u at the start of this cell.
+    """
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -256,6 +263,9 @@ def sweep_cells(
     in contact; the integral of w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in
     contact, otherwise 0. `places`, shape (2, capacity), receives the positions where the first `capacity` patches begin
     and end. Further patches are only counted.
+
+    On a periodic line, the first patch begins at the highest point, and the last patch ends there. If a free element
+    arrives at the highest point, the last patch has the length 0.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -351,7 +361,7 @@ def sweep_cells(
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
     if not (cells.periodic or contact):
         return patches
-    # a period ends at the highest point, where a free element comes into contact
+    # the last patch ends at the highest point of a periodic line, or at the end of any other line
     if patches < ends.size:
         begins[patches], ends[patches] = begins[patches] if contact else n + start, n + start
     return patches + 1
@@ -361,7 +371,7 @@ def sweep_cells(
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the positions where the contact patches begin, and the positions where the patches end."""
+    """Return the positions where the contact patches begin and where they end, as described in `sweep_cells`."""
     places = np.empty((2, 2 * cells.mean.size + 1))  # contact ends at most twice in a cell, and at the end of the line
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)
     return places[0, :count], places[1, :count]

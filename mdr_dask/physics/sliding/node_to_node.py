@@ -334,6 +334,7 @@ def _contact_end(
     x += (w + r * s) * tangent
     x = x if x > begins else begins
     x = x if x < 1 else 1.0
+    # where contact ends, w = -De w'; w is therefore at most De times the steepest descent (at start, middle or end)
     steepest = max(max(-cell.s0, -cell.s1), 0.25 * (cell.s0 + cell.s1) - 1.5 * (cell.w1 - cell.w0))
     crest = max(min(_at(cell, x), r * max(steepest, 0.0)), 0.0)
     return x, crest, _fading((1 - x) * inverse)
@@ -345,7 +346,8 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
 
     At the start of the cell, the displacement of the element is u. `inverse` is 1 / De. At the place `last`, an element
     that stayed free would have the gap u - w = `gap_last` <= 0. The first guess of the place is the zero of a parabola
-    through the gaps at the start of the cell and at `last`. One Newton step improves this guess.
+    that has the gap and the slope of the gap at the start of the cell, and the gap at `last`. One Newton step improves
+    this guess.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + TINY)
@@ -368,9 +370,10 @@ def _contact_in_cell(
     """Return whether a free element comes into contact in a cell, and four numbers about the end of the contact.
 
     At the start of the cell, the displacement of the element is u. If no contact began, the displacement at the end of
-    the cell would be `kept`. The four numbers are: the place where the contact ends (1 if contact continues in the next
-    cell); w at this place; the fraction of w that remains at the end of the cell; and the gap u - w that an element
-    without contact would have at this place. If no contact begins, the four numbers have no meaning.
+    the cell would be `kept`. The Deborah number is `r`, and `inverse` is 1 / r. The four numbers are: the place where
+    the contact ends (1 if contact continues in the next cell); w at this place; the fraction of w that remains at the
+    end of the cell; and the gap u - w that an element without contact would have at this place. If no contact begins,
+    the four numbers have no meaning.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -455,9 +458,10 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
-    """Add the sums of a block in all cases in which the block is entirely in contact or entirely free.
+    """Add the sums of a block in all cases in which bounds show that it is entirely in contact or entirely free.
 
-    Write the indices of all remaining cases to the queue, and return the number of remaining cases.
+    In these cases, also update u and du/d(depth) to the end of the block. Write the indices of all remaining cases to
+    the queue, and return the number of remaining cases.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -502,8 +506,8 @@ def sweep(
 ) -> None:
     """Move one element of every case through the cell of the summit, and then along one period of the line.
 
-    The sums in the workspace are those of the period. Blocks in which contact begins or ends are computed on a finer
-    grid, which is interpolated with `weights`.
+    The sums in the workspace are those of the period. Blocks in which contact may begin or end, and the cells after the
+    last block, are computed on a grid with ``weights.shape[1]`` times as many nodes.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -622,8 +626,9 @@ class NodeToNode:
     def solve(self, level: int, cases: IntArray) -> Solution:
         """Solve cases on a grid of `level` nodes per Nyquist point.
 
-        The first call must be for level 1, and solves all cases. Above level 2, the grid is interpolated from 2 nodes
-        per Nyquist point, and is finer only in blocks in which contact begins or ends.
+        The levels must be solved in the order 1, 2, 4, ... On level 1, all cases are solved, whatever `cases` contains.
+        Above level 2, the grid is interpolated from 2 nodes per Nyquist point, and is finer only in blocks in which
+        contact may begin or end.
         """
         if level == 1:
             return self._start()
@@ -653,14 +658,16 @@ class NodeToNode:
         return self._solution(results, self._depth, 1)
 
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
-        """Return the results on a grid, with the possible errors due to a contact patch that the grid does not resolve.
+        """Return the results on a grid, with the errors that may be equal on two grids (`Solution.unseen`).
 
-        With fewer than `RESOLVED` cells in contact, the outcome of a case is `DEPTH_NOT_FOUND`.
+        If no depth was found, or fewer than `RESOLVED` cells are in contact, the outcome of a case is
+        `DEPTH_NOT_FOUND`.
 
-        A contact patch of at most about one cell may lie between two nodes, and be missing on two successive grids. The
-        missing patch makes the length in contact too small. Because the slope is small near a summit, the missing patch
-        makes the rms slope in contact too large. The relative error of the rms slope is at most half the relative error
-        of the length.
+        Every result has the error `ARITHMETIC`. Contact fraction and contact slope have an additional error: a contact
+        patch of at most about one cell may lie between two nodes, and be missing on two successive grids. The missing
+        patch makes the length in contact too small. Because the slope is small near a summit, the missing patch makes
+        the rms slope in contact too large. The relative error of the rms slope is at most half the relative error of
+        the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,10 +1,11 @@
 """Steady sliding of a solid over a line, in dimensionless quantities. A case is a pair of speed and load.
 
 A Kelvin solid has no friction on a smooth plane. Full contact of any solid with a rough plane has a closed form, which
-is used if `oversampling` is "auto" and the scheme is "hermite". All other cases are solved by one of three modules:
+is used if `oversampling` is "auto" and, for a Kelvin solid, the scheme is "hermite". All other cases are solved by one
+of three modules:
 
-* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane, also only if `oversampling` is "auto" and the
-  scheme is "hermite";
+* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane, if `oversampling` is "auto", the scheme is
+  "hermite", and the requested accuracy is above `node_to_node.ARITHMETIC`;
 * `steady` (sweeps over cubic cells, or backward Euler) for all other cases of a Kelvin solid, and for cases in which
   `node_to_node` misses the accuracy;
 * `viscoelastic` (sweeps over straight cells) for any other solid.
@@ -27,9 +28,10 @@ from mdr_dask.physics.sliding.full_contact import steady_full_contact
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
-"""The relative error of a result is the error divided by the result, or by its floor if the result is smaller.
+"""The relative error of a result is the error divided by the magnitude of the result, or by a floor if this is larger.
 
-The four floors belong to `Steady.columns`. The floor of the depth is the unit of height, which is the rms height.
+The four floors belong to the rows of `Steady.columns`. The floor of the depth is the unit of height, which is the rms
+height.
 """
 NODE_LEVELS = tuple(
     2**k for k in range(12)
@@ -81,8 +83,8 @@ def solve(
     is eta v / (G_inf L), where eta is the viscosity of the dashpot. For a Kelvin solid, the Deborah number is equal to
     v tau / L. The load is F_N / (4 G_inf L), in the unit of height.
 
-    The errors are the absolute discretisation errors of `Steady.columns`, or infinite if the errors are not estimated.
-    If `oversampling` is "auto" and no solver meets the accuracy in a case, the results of the solver with the smallest
+    The errors are the absolute discretisation errors of `Steady.columns`, or infinite where there is no estimate. If
+    `oversampling` is "auto" and no solver meets the accuracy in a case, the results of the solver with the smallest
     error of the drag are returned, on the finest grid on which this solver found a solution.
     """
     cases = Cases(deborah, loads)
@@ -138,7 +140,8 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
     With cubic cells, each search for the depth starts from the depth on the previous grid.
     """
     depths = np.full(cases.loads.size, np.nan)
-    # contact fraction and slope are computed at a rounded depth; the effect of rounding may be equal on two grids
+    # with cubic cells, contact fraction and slope are computed at a rounded depth, and the effect of rounding may be
+    # equal on two grids
     unseen = np.array([[0.0], [0.0], [1.0], [1.0]]) * 2.0 ** (1 - steady.LATTICE_BITS)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -177,7 +180,7 @@ def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntA
 def _in_full_contact(
     line: RoughLine, terms: PronyTerms, cases: Cases
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
-    """Return results, errors and status of cases on a plane. The status is INVALID if contact is not full."""
+    """Return results, errors and status of cases on a plane. The status is INVALID unless contact is certainly full."""
     pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
     full = steady_full_contact(line, pairs, cases)
     errors = ROUNDING * np.abs(full.columns)

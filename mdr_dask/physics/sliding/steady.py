@@ -68,9 +68,9 @@ def _solve(
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
-    The carried load is a convex, increasing function of the depth. Newton's method therefore approaches the depth from
-    above. The depth cannot exceed the depth in full contact at this load. The result does not depend on the guess.
-    `sums` receives the sums at the returned depth.
+    The carried load is a convex, increasing function of the depth. After the first step, Newton's method therefore
+    approaches the depth from above. The depth cannot exceed the depth in full contact at this load. The result does not
+    depend on the guess. `sums` receives the sums at the depth, if it was found.
     """
     cells, blocks, barriers, mean = line
     most, high = load / (cells.mean.size - 1) - mean, np.inf
@@ -114,8 +114,9 @@ def _states(
     """Solve cases on one line at one Deborah number. The loads of the cases must be ascending.
 
     `results` has the columns `COLUMNS` of `cases.py`. The search for the depth starts from the entry of the case in
-    `guesses`. If this entry is NaN, `_guess` computes the start from the previous case, or from `first` for the first
-    case. Return depth, load and d(load)/d(depth) of the first case that was solved, or `first` if there is none.
+    `guesses`. If this entry is NaN, `_guess` computes the start from the last case that was solved, or from `first` if
+    there is none. Return depth, load and d(load)/d(depth) of the first case that was solved, or `first` if there is
+    none.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, np.empty((2, 0))
@@ -207,8 +208,10 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Convert Deborah numbers and loads to the unit of a cell width, and solve the cases in which both are valid.
-    All other cases are `INVALID`. If the line contains a number that is not finite, all cases are `INVALID`.
+    """Solve the cases in which the Deborah number and the load are valid. All other cases are `INVALID`.
+
+    The function `solve` receives the selection of valid cases, and the cases with the Deborah number v tau / dx and the
+    load F_N / (4 G dx). If the line contains a number that is not finite, all cases are `INVALID`.
     """
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
@@ -224,7 +227,7 @@ def _solved(
 def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve cases by sweeps over cells.
 
-    Deborah numbers are v tau / dx, loads are F_N / (4 G dx), and guesses are depths of the highest point.
+    Deborah numbers are v tau / dx, loads are F_N / (4 G dx), and guesses are penetrations of the highest point or NaN.
     """
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
@@ -246,11 +249,11 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return for each case whether rounding errors dominate the results.
+    """Return for each case whether the results are lost to rounding.
 
-    Rounding errors dominate if the line rises very little from the place where contact begins to the highest point. If
-    the dashpots carry the load, this rise is `loads` / `deborah`. `near` contains the heights of the two nodes next to
-    the highest point, relative to the highest point.
+    The results are lost if the line rises very little, compared with `LOST`, from the place where contact begins to the
+    highest point. If the dashpots carry the load, this rise is `loads` / `deborah`. `near` contains the heights of the
+    two nodes next to the highest point, relative to the highest point. `depth` is the penetration of the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

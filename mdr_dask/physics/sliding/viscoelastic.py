@@ -43,8 +43,9 @@ class ViscoelasticCase:
     def on(self, height: FloatArray, periodic: bool) -> Solution:
         """Solve the case on the next finer grid.
 
-        From the second grid on, the results are extrapolated from the last two grids. A periodic line begins and ends
-        at the highest node. This node must be a node of every grid.
+        From the second grid on, each result is extrapolated from the last two grids, unless the difference between the
+        grids exceeds the result. A periodic line begins and ends at the highest node. This node must be a node of every
+        grid.
         """
         cells = height.size - 1
         summit = float(np.max(height))
@@ -92,6 +93,8 @@ class ViscoelasticCase:
 
 def travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths divided by the cell width and stresses divided by the static modulus.
+
+    The relaxation times of `solid` must be given as distances tau_m v, in the unit of the cell width `cell`.
 
     The dashpot, and all Prony terms that relax within the fraction `CLOSE` of a cell, are replaced by one Prony term
     that relaxes within this fraction and has the same viscosity.
@@ -186,9 +189,10 @@ def newton_step(residual: FloatArray, scale: FloatArray, swept: Swept, workspace
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
     `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u. `scale` contains
-    the magnitude of the derivative of each integral with respect to the matching unknown. If every row is divided by
-    the scale of the row, the matrix is the identity plus a smooth operator with fast decreasing singular values. Four
-    to seven products of the matrix and a vector are therefore enough for any number of terms.
+    an estimate of the derivative of each integral with respect to the matching unknown. `step` receives the changes of
+    the unknowns. If every row is divided by the scale of the row, the matrix is the identity plus a smooth operator
+    with fast decreasing singular values. Four to seven products of the matrix and a vector are therefore enough for any
+    number of terms.
     """
     n = residual.size
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)

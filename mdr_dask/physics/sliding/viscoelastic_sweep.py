@@ -3,7 +3,8 @@
 The unit of length is the cell width, and stresses are divided by the static modulus. The stretch e_m of the spring in
 Prony term m obeys de_m/ds = du/ds - e_m / deborah_m, where u is the displacement, s is the travelled distance, and
 deborah_m is the distance tau_m v. In contact, u is the penetration w, and the stretches have closed forms. The
-displacement of a free element is a sum of exponential modes.
+displacement of a free element is a sum of exponential modes. The sweep neglects only contacts that begin and end inside
+one cell.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ class Travelling(NamedTuple):
     """A sliding solid and the recovery modes of the solid.
 
     Stresses are divided by the static modulus, and lengths by the cell width. The Prony terms are in ascending order of
-    the Deborah number tau_m v / dx. `times` are the decay lengths v t of the recovery modes, where t is
-    the decay time of a mode. Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k alone
-    has the strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m alone has the
+    the Deborah number tau_m v / dx. `times` are the decay lengths v t of the recovery modes, where t is the decay time
+    of a mode. Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k alone has the
+    strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m alone has the
     stretch 1.
     """
 
@@ -138,9 +139,10 @@ def _next_contact(
 ) -> float:
     """Return the position beyond `place` where a free element meets the line again, or -1 if contact does not begin.
 
-    The search begins in the cell that ends at `node`. If contact ended inside a cell, the search must begin in the next
-    cell, because the convex strain does not meet the same straight cell again. The logarithm of the strain is convex,
-    so that a tangent exponential function is a lower bound of the strain. Nodes below this lower bound are skipped.
+    Contact is detected where the line is above the free element at a node. The search begins in the cell that ends at
+    `node`. If contact ended inside a cell, the search must begin in the next cell, because the convex strain does not
+    meet the same straight cell again. The logarithm of the strain is convex, so that a tangent exponential function is
+    a lower bound of the strain. Nodes below this lower bound are skipped.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -169,7 +171,7 @@ class Passage(NamedTuple):
     first ones (see `sweep_line`). `imbalance` contains the integral of each e_m over the line, which is 0 in the steady
     state on a periodic line. The six entries of `totals` are: integral of u; integral of the stress; integral of the
     stress times the slope; length in contact; integral of slope^2 over the length in contact; and integral of u beyond
-    the end of the line.
+    the end of the line (0 if the element is in contact at the last node).
     """
 
     lengths: FloatArray

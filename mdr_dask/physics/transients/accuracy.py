@@ -2,9 +2,9 @@
 
 The steady states before and after a jump, and the drag just after the jump, are solved on finer and finer grids
 (:mod:`mdr_dask.physics.refine`). The transient is computed by a march on one grid. From drag and depth in the march,
-the steady values on the same grid are subtracted, and the accurate steady values are added. A transient is therefore
-accurate even if it is much smaller than the friction. The error of the transient is estimated by a second march with
-half as many nodes and half as many time steps.
+the steady values after the jump on the same grid are subtracted, and the accurate steady values are added. A transient
+is therefore accurate even if it is much smaller than the friction. The error of the transient is estimated by a second
+march with half as many nodes and half as many time steps.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ class Jumps(NamedTuple):
     Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height. `trace`
     and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute. `errors` is
     NaN if no accuracy was requested. `trace`, `depth` and their errors are NaN for cases without a solution. The errors
-    `trace_error` and `depth_error` are also NaN if they were not requested. `contact` is the larger of two fractions of
-    the line: the fraction in contact in steady sliding before the jump, and the fraction after it.
+    `trace_error` and `depth_error` are also NaN if they were not requested, and infinite if there is no march on
+    the coarse grid. `contact` is the larger of two fractions of the line: the fraction in contact in steady sliding
+    before the jump, and the fraction after it.
     """
 
     levels: Levels
@@ -71,11 +72,11 @@ def solve_jumps(
     """Solve the velocity jumps on a line.
 
     Loads are F_N / (4 G L h), where h is the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2
-    tau / L. `accuracy` is the allowed relative error of the steady values. The error of a depth smaller than h is
-    divided by h, not by the depth. If `accuracy` is None, the steady states are solved on the grid of the march only,
-    and `with_errors` must be False. `oversampling` is the number of nodes per Nyquist point in the march, and must be
-    even. The steady states use at least as many nodes. If `march` is None, no transient is computed. If `with_errors`
-    is True, the errors of the transients are estimated.
+    tau / L. `accuracy` is the allowed relative error of all `Levels`. The error of a depth smaller than h is divided by
+    h, not by the depth. If `accuracy` is None, the steady states are solved on the grid of the march only, and
+    `with_errors` must be False. `oversampling` is the number of nodes per Nyquist point in the march, and must be even.
+    The steady states use at least as many nodes. If `march` is None, no transient is computed. If `with_errors` is
+    True, the errors of the transients are estimated.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -126,9 +127,10 @@ def solve_jumps(
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and depth between the two grids at or after each of `times`.
+    """Return the largest differences of the transients on the two grids at or after each of `times`, shape (2, times).
 
-    The differences are infinite if there is no march on the coarse grid.
+    The transients are drag and depth minus the steady values after the jump. The differences are infinite if there is
+    no march on the coarse grid.
     """
     if coarse is None:
         return np.full((2, times.size), np.inf)

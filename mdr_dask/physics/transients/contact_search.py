@@ -74,7 +74,8 @@ class Reachable(NamedTuple):
     """Runs of cells in which contact is possible at depths between two limits.
 
     Each row of `runs` contains the first and the last node of a run. `second` is the largest height outside the patch
-    that contains the highest point of the line, in steady sliding at the lower of the two velocities.
+    that contains the highest point of the line, in steady sliding at the lower of the two velocities, or -inf if there
+    is none.
     """
 
     runs: IntArray
@@ -86,7 +87,7 @@ class Workspace(NamedTuple):
 
     Only the first entries of `start` and `end` are used: as many as `find_contact` returns. The barriers of the cells
     belong to the Deborah number after the jump. `free_until` contains, for each cell, the largest depth at which the
-    cell is certainly out of contact.
+    cell is certainly out of contact, or -inf if no such depth is known.
     """
 
     start: FloatArray
@@ -110,10 +111,10 @@ def workspace_for(barriers: Barriers, free_until: FloatArray) -> Workspace:
 class Motion(NamedTuple):
     """Changes of the depth and of the lift from the jump until now.
 
-    `rise` is the largest mean rate of increase of the lift in any interval that ends now. `fall` is the largest rate at
-    which the lift has decreased from one time step to the next. `deepest` is the largest depth so far, and `highest` is
-    the largest lift so far. `passes_top` is True if free elements may have passed the highest point of the line without
-    contact.
+    `rise` is the largest rate of increase of the lift: the rate now, or the mean rate from any earlier instant until
+    now. `fall` is the largest rate at which the lift has decreased from one instant to the next. Both are at least 0.
+    `deepest` is the largest depth so far, and `highest` is the largest lift so far. `passes_top` is True if free
+    elements may have passed the highest point of the line without contact.
     """
 
     rise: float
@@ -138,9 +139,9 @@ class Cell(NamedTuple):
     """Cell i of the line. `line` contains the coefficients of the cubic height of the line in this cell.
 
     `stop` is the end of the cell, or the end of the period if the period ends in this cell. `pressed` is True if the
-    force on elements in contact would be positive everywhere in the cell. `weak` is True if this force may have been
-    negative at an earlier instant. `separated` is True if elements may have separated in the cell although the force is
-    positive now.
+    force on elements in contact would be positive everywhere in the cell. In the last cell, which is a copy of the
+    first, `pressed` is always False. `weak` is True if this force may have been negative at an earlier instant.
+    `separated` is True if elements may have separated in the cell although the force is positive now.
     """
 
     i: int
@@ -156,7 +157,8 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the contact patches at the last instant of the history. Return the number of patches.
 
     The number is 0 if a patch extends beyond its run, or if a work array is full. The patches and the sums over the
-    patches are written to the workspace.
+    patches are written to the workspace. The last patch ends at the highest point, and has the length 0 if free
+    elements arrive there.
     """
     last, recovery = now.history.count - 1, work.recovery
     motion = _motion_until(now, reachable.second)
@@ -321,7 +323,8 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
     """Find where contact ends in a cell beyond x.
 
     Return the place where contact ends, the place where the search continues, whether free elements arrive with a
-    displacement larger than depth + h, and whether the force falls to zero.
+    displacement larger than depth + h, and whether the force falls to zero. If contact does not end in the cell, both
+    places are the end of the cell.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     place = NONE
@@ -348,10 +351,11 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
 
 @jit_inline_uncounted
 def _overtaking(search: Search, held: float, x: float, w: float) -> float:
-    """Return the displacement of free elements that may arrive at x inside a patch, or 0 if no free element can arrive.
+    """Return the displacement of free elements that may arrive at x inside a patch.
 
-    An element in contact at x has the displacement w. The patch is certainly in contact up to `held`, and no element of
-    the patch has separated between `held` and x.
+    The result may be 0 if no free element arrives with a displacement larger than w. An element in contact at x has the
+    displacement w. The patch is certainly in contact up to `held`, and no element of the patch has separated between
+    `held` and x.
     """
     now, recovery = search.now, search.work.recovery
     if x > held:
@@ -365,7 +369,10 @@ def _overtaking(search: Search, held: float, x: float, w: float) -> float:
 
 @jit_inline_uncounted
 def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
-    """Store the current patch, and a lower bound of the displacement of free elements one cell beyond the patch."""
+    """Store the current patch, and add it to the sums.
+
+    Also store a lower bound of the displacement of free elements one cell beyond the patch.
+    """
     now, motion, work, scan = search.now, search.motion, search.work, search.work.scan
     if is_lost:
         _, slope, _, by_depth, opening = gap_at(now, work.recovery, end)
@@ -389,9 +396,9 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     """Return True and the place where contact begins beyond x in a cell, or False and the place to search next.
 
     Contact can begin only between `low`, where the force becomes positive, and `high`, where the force falls to zero
-    again. If contact does not begin, `high` is stored as a place of separation, because elements may have separated
-    there at an earlier instant. If `ended` is True, contact has just ended at x, or the force has just fallen to zero
-    at x.
+    again. If contact does not begin and `high` is in the cell, `high` is stored as a place of separation, because
+    elements may have separated there at an earlier instant. If `ended` is True, contact has just ended at x, or the
+    force has just fallen to zero at x.
     """
     now, scan, recovery = search.now, search.work.scan, search.work.recovery
     i, line, lift, depth = cell.i, cell.line, search.lift, search.depth
@@ -425,8 +432,7 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
 
 @jit_inline_uncounted
 def _add_edge(search: Search, place: float, steep: float, by_depth: float, opening: float) -> None:
-    """Add to the sums the changes of load and drag that are due to the motion of an edge at which the force is not
-    zero.
+    """Add to the sums the derivatives of load and drag that are due to the motion of an edge with a positive force.
 
     `steep` is the slope of the gap towards the inside of the patch. `by_depth` and `opening` are the derivatives of the
     gap with respect to depth and time.
@@ -460,7 +466,10 @@ def _add_separation(search: Search, place: float) -> None:
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add to `recovery` a cell in which elements may have separated earlier, although the force is positive now."""
+    """Add to `recovery` a cell in which elements may have separated earlier, although the force is positive now.
+
+    If the last entry is a run that ends at this cell, the run is extended.
+    """
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1

@@ -6,8 +6,9 @@ decays afterwards. The displacement of the element is the largest of the decayed
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
-This formula needs only the history of the depth d(t). A free element separated from the line at the time t' of the
-maximum. Unless the element separated at the jump itself, the force on the element was zero then.
+This formula needs only the history of the depth d(t). Before the jump, the depth was constant and D had another value
+(see `from_before`). A free element separated from the line at the time t' of the maximum. Unless the element separated
+at the jump itself, the force on the element was zero then.
 
 The *drift* of free elements is D u' + u, where u' is the derivative along the line. If an element separated after the
 jump, its drift is -d'(t') exp(-(t - t')), where t' is the time of separation and d' is the rate of the depth. The
@@ -112,7 +113,10 @@ def window(distance: float) -> int:
 
 @jit_inline_uncounted
 def _depth_at(history: History, t: float) -> tuple[float, float, float]:
-    """Return depth, rate and second derivative at time t, by cubic Hermite interpolation of the history."""
+    """Return depth, rate and second derivative at time t, by cubic Hermite interpolation of the history.
+
+    At the last instant, the second derivative is set to 0.
+    """
     last = history.count - 1
     if last <= 0 or t >= history.time[last]:
         return history.depth[last], history.rate[last], 0.0
@@ -154,9 +158,8 @@ def _in_period(now: Instant, s: float) -> float:
 def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return the displacement u, du/dx and du/d(depth) of an element at x that separated near a place.
 
-    The place of separation is between `place`, where the force vanishes now, and `farthest`, the farthest place where
-    the force has vanished since the jump. If the element did not separate between these places, the returned
-    displacement is -1.
+    The search for the place of separation starts at `place`. The force has not vanished anywhere beyond `farthest`
+    since the jump. If the search finds no place of separation, the returned displacement is -1.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -275,7 +278,8 @@ def contact_begin(
 ) -> tuple[float, float, float, float]:
     """Return the place where the line rises above free elements, with the derivatives of the gap at this place.
 
-    The gap is differentiated with respect to place, depth and time. The first guess x is between `low` and `high`.
+    The gap is differentiated with respect to place, depth and time. If the first guess x is not between `low` and
+    `high`, the search starts in the middle.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
     for _ in range(MOST_ITERATIONS):
@@ -316,7 +320,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Delete the entries of `recovery` that cannot matter at or beyond x, where the line imposes a displacement.
+    """Delete the entries of `recovery` that cannot matter at or beyond x, a place in contact.
 
     An entry is deleted if the elements that separated there certainly have smaller displacements at x than `pressed`,
     the displacement that the line imposes at x. `deepest` is the largest depth since the jump.

@@ -70,7 +70,8 @@ class SteadyLimits(NamedTuple):
     drag with respect to `rate`. `depth` and `contact` (fraction of the line) are pairs of steady values, before and
     after the jump. `first` contains the contact patches before the jump, and `slower` the patches in steady sliding at
     the lower of the two velocities. If one of the two steady states was not found, `first` and `slower` are None, and
-    all numbers are NaN. `is_full` states whether the whole line is in contact in both steady states.
+    all numbers are NaN. If only the state just after the jump was not found, `at`, `rate` and `tilt` are invalid.
+    `is_full` states whether the whole line is in contact in both steady states.
     """
 
     before: float
@@ -95,7 +96,8 @@ def steady_limits(
     separate if the force on them would become negative.
 
     Loads are F_N / (4 G L), in the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2 tau / L.
-    `guesses` are depths at which the searches start. The guesses do not affect the results.
+    `guesses`, shape (cases, 2), are penetrations of the mean line at which the searches start, or NaN. The guesses do
+    not affect the results.
     """
     guess = None if guesses is None else guesses.ravel()
     steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)

@@ -81,6 +81,7 @@ def _balance(
 ) -> tuple[int, float, float]:
     """Find, by Newton's method, the depth that carries the load at the last instant of the history.
 
+    The rate of the depth d is a d + b, where a and b are the two `weights`. Depth and rate are written to the history.
     Return the outcome, the drag, and the derivative of the drag with respect to t / tau.
     """
     now, load = history.count - 1, marching.load
@@ -148,7 +149,7 @@ def march_depth(marching: Marching, found: Trajectory, work: Workspace) -> int:
     The first two time steps use formulas of second order.
 
     `found` contains all times. The other quantities in `found` are given at the first instant, and are written for all
-    later instants. Return an `Outcome`.
+    later instants. If a time step fails, the march ends, and the remaining entries are undefined. Return an `Outcome`.
     """
     time, depth, rate, drag, drag_rate = found
     for now in range(1, time.size):

@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 # The search for an edge of contact ends after a step s shorter than AT_EDGE, with an error of about s^3 (in cells).
 AT_EDGE = 1e-2
-# Entries of the sums over the patches; load and drag are divided by 4 G dx
+# Entries of the sums over the patches; the load is F_N / (4 G dx), and the drag is F_x / (4 G)
 (
     LOAD,
     DRAG,
@@ -132,7 +132,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return the first place x between y and 1 where p + q x + r x^2 + c x^3 falls through zero, or `NONE`.
 
-    The cubic is not negative at y.
+    The cubic must not be negative at y.
     """
     width = 1 - y
     begin, end = p + y * (q + y * (r + y * c)), p + q + r + c

@@ -135,8 +135,9 @@ def march(
     """March from the steady state before the jump. Return constants, trajectory and workspace, and the outcome.
 
     In the march, lengths are in cells, and the load is F_N / (4 G dx). The depth may leave the interval between the two
-    steady depths by a margin, which is at first as large as the interval. If the march fails, it is repeated with 4
-    times and then with 16 times this margin, because the margin may have been too small.
+    steady depths by a margin, which is at first as large as the interval, but not below a minimum (`NEGLIGIBLE`). If
+    the march fails, it is repeated with 4 times and then with 16 times this margin, because the margin may have been
+    too small.
     """
     cells = line.track.cells
     load, deborah = load * cells, deborah * cells
@@ -160,10 +161,12 @@ def _begun(
 ) -> tuple[Marching, Trajectory, Workspace]:
     """Return the constants, trajectory and workspace of a march. Lengths are in cells.
 
-    `change` is the change of the steady depth due to the jump. The depth may leave the interval between the steady
-    depths by `margin`. The times are equidistant in log(1 + t / onset). The onset is the time in which the line travels
-    1 / q_max at the larger of the speeds v_2 and v_1 - v_2, but at most one relaxation time. If the velocity falls, the
-    onset is also so small that the first time step ends no later than the first requested time after the jump.
+    `change` is the magnitude of the change of the steady depth, or a minimum (`NEGLIGIBLE`) if that is larger. The
+    depth may leave the interval between the steady depths by `margin`. The march ends at the last requested time, but
+    after `MEMORY` relaxation times at the latest. The times are equidistant in log(1 + t / onset). The onset is the
+    time in which the line travels 1 / q_max at the larger of the speeds v_2 and v_1 - v_2, but at most one relaxation
+    time. If the velocity falls, the onset is also so small that the first time step ends no later than the first
+    requested time after the jump.
     """
     assert limits.first is not None
     assert limits.slower is not None
@@ -194,7 +197,7 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
     """Return the first and the last node of each run of cells where contact is possible at depths from `low` to `high`.
 
     A run also contains the neighbouring cell on each side. Also return, for each cell, the largest depth at which the
-    cell is certainly out of contact.
+    cell is certainly out of contact, or -inf if no such depth is known.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)

@@ -40,7 +40,8 @@ class Foundation(NamedTuple):
 def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
     """Return a foundation. `moduli` are G_m / G_inf, `times` are the distinct tau_m, and `viscosity` is eta / G_inf.
 
-    For a Kelvin solid (no Prony terms), the viscosity is 1 if the unit of time is tau.
+    For a Kelvin solid (no Prony terms), the viscosity is 1 if the unit of time is tau. A ValueError is raised for a
+    solid without Prony terms and without a dashpot.
     """
     g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if g.size == 0 and not viscosity > 0:

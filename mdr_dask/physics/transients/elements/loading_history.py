@@ -160,8 +160,9 @@ def follow_line(line: CubicLine, solid: Foundation, schedule: Schedule, state: S
     During a time step, an element in contact moves at constant speed, and a free element recovers by the modes of the
     solid. The mean displacement depends on the load, but not on which elements are in contact. The depth for this mean
     is the root of a convex function. If the line is not periodic, elements enter undeformed. Between two elements, the
-    force is interpolated by a cubic in cells with full contact, and linearly in all other cells. The interpolation is
-    most accurate if the line has no kinks. `state` and `depth` describe the first instant and are not overwritten.
+    force is interpolated linearly. In cells with full contact, the integrals are corrected for the curvature of the
+    force where it is known. The integrals are most accurate if the line has no kinks. `state` and `depth` describe the
+    first instant and are not overwritten.
     """
     now, out = deepcopy(state), np.full((3, schedule.instants.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
@@ -230,7 +231,8 @@ class Piece:
         """Return the times of all steps from the start of the piece to `end`, or None if there would be too many steps.
 
         After a short first time step, the time since the start of the piece grows in a constant ratio, until the time
-        steps are as long as the longest time step. All further time steps are equal.
+        steps are as long as the longest time step. All further time steps are equal. If `end` is not after the start of
+        the piece, the only time is the start.
         """
         span = end - self.start
         if span <= 0:
@@ -256,7 +258,7 @@ class Trace(NamedTuple):
     steady state before t = 0. `at` is the friction just after t = 0. `after` is the friction in the final steady state.
     `after` is NaN if the history does not end in steady forward sliding, or if this steady state is not found. At a
     jump, `friction` and `depth` are the values just after the jump. `contact` is the largest fraction of the line in
-    contact from t = 0 to the last requested time.
+    contact from t = 0 to the last requested time. If the outcome is not CONVERGED, all numbers are NaN.
     """
 
     before: float
@@ -344,7 +346,10 @@ def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
 
 
 def _with_times(instants: FloatArray, times: FloatArray) -> FloatArray:
-    """Return the times of the steps and the requested times. A requested time replaces the nearest time of a step."""
+    """Replace the times of the steps that are nearest to requested times by the requested times.
+
+    The first and the last time of the steps are kept. Requested times outside this interval are left out.
+    """
     inside = times[(times > instants[0]) & (times < instants[-1])]
     kept = np.ones(instants.size, np.bool_)
     kept[np.searchsorted(0.5 * (instants[1:] + instants[:-1]), inside)] = False

@@ -77,7 +77,8 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
     """Return the depth d at which the mean displacement is `mean`, and whether this depth was found.
 
     The displacement of an element is max(d + h, free). Here `under` contains the height h of the line, and `free` the
-    displacement of the element without contact. The mean displacement is a convex, increasing function of d.
+    displacement of the element without contact. The mean displacement is a convex, increasing function of d. If the
+    mean of `free` is equal to `mean`, the largest depth without contact is returned.
     """
     n = under.size
     for _ in range(MOST_ITERATIONS):
@@ -106,9 +107,11 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, is_smooth: BoolArray, j: int) -> float:
-    """Return the mean of `values` over the cell before node j, with the mean curvature at the two ends of the cell.
+    """Return the mean of `values` over the cell before node j, by the trapezium rule with a correction for curvature.
 
-    An end has a curvature if the values at both its neighbours are smooth (see `StepWorkspace`).
+    The correction uses the mean of the curvatures at the two ends of the cell. The curvature at an end is known only if
+    the values at both neighbours of this node are smooth (see `StepWorkspace`). If neither curvature is known, there is
+    no correction.
     """
     n, bend, ends = values.size, 0.0, 0
     for i in (j - 1, j):
@@ -137,7 +140,9 @@ def _cell(
 ) -> tuple[float, float]:
     """Return where contact starts and ends in the cell before element j, as positions from 0 to 1.
 
-    If `keep` is True, write the edge of contact to `edges`.
+    Both positions are 0 if the force is positive at neither end of the cell. If `keep` is True, the edge of this cell
+    in `edges` is deleted if both elements are in contact or both are free, and is updated if the force vanishes in the
+    part of the cell that is in contact.
     """
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
@@ -163,7 +168,11 @@ def _cell(
 
 @jit
 def _forces(state: State, workspace: StepWorkspace, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return mean load, mean drag and the fraction of the line in contact. If `keep` is True, store the edges."""
+    """Return mean load, mean drag and the fraction of the line in contact.
+
+    Edges are deleted in cells between two free elements, and in the cell before the element `first`. If `keep` is True,
+    all other edges are updated.
+    """
     force, power, slope, gaps = workspace.force, workspace.power, workspace.slope, workspace.gaps
     n, touching, edges = force.size, state.touching, state.edges
     load, drag, length = 0.0, 0.0, 0.0
@@ -359,7 +368,7 @@ def _separate(
     depth: float,
     deborah: tuple[float, float],
 ) -> None:
-    """Write the times at which elements separate in a step, and the displacements of these elements after the step."""
+    """Write `parts`, `leaves` and `after` of `StepWorkspace` for elements that separate during a step."""
     parts, leaves, fall = workspace.parts, workspace.leaves, (depth - old_depth) / lapse.time
     for j in range(workspace.under.size):
         if state.touching[j]:
@@ -410,8 +419,8 @@ def _step(
 ) -> tuple[float, bool]:
     """Move all elements through a time step. Return the depth at the end, and whether this depth was found.
 
-    `mean` is the mean displacement at the end of the time step. `deborah` contains v tau / L at the start and at the
-    end.
+    `mean` is the mean displacement at the end of the time step. `deborah` contains the velocities of `Schedule` at the
+    start and at the end.
     """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
