@@ -35,7 +35,10 @@ class Statistic:
 
 
 def has_biased_means(status: xr.DataArray) -> bool:
-    """Return whether any case has both failed and successful realisations; the mean of such a case may be biased."""
+    """Return whether any case has both failed and successful realisations; the mean of such a case may be biased.
+
+    A realisation that did not converge counts as failed.
+    """
     if "realisation" not in status.dims:
         return False
     failed = status.isin([Status.FAILED.value, Status.NOT_CONVERGED.value]).any("realisation")
@@ -88,7 +91,7 @@ def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.D
     """Return the mean, the lower end and the upper end of the interval of the mean (see `interval`).
 
     If only one realisation of a case succeeded, the interval is the mean plus or minus the discretisation error. If
-    this error is unknown too, the ends are NaN.
+    this error is unknown, the ends are NaN.
     """
     array, error = array.compute(), None if error is None else error.compute()
     middle, ends = mean(array), interval(array, error)
@@ -175,7 +178,8 @@ def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
     """Return statistics over the realisations of a dataset, as variables ``<output>_<statistic>``.
 
-    Outputs without the dimension ``realisation`` are left out. Raise DataError if a statistic does not exist.
+    The variable ``status``, the companions, and outputs without the dimension ``realisation`` are left out. Raise
+    DataError if a statistic does not exist.
     """
     for name in statistics:
         if name not in NAMES:

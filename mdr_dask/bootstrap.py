@@ -164,13 +164,19 @@ def chance(residuals: FloatArray, count: int) -> float:
 
 
 def scatter(residuals: FloatArray, count: int) -> float:
-    """Return the rms residual that scatter and errors alone exceed with probability 5 %; NaN for too few resamples."""
+    """Return the rms residual that scatter and errors alone exceed with probability 5 %.
+
+    The result is NaN for fewer than two realisations, or too few resamples.
+    """
     caused = _caused(residuals, count)
     return float(np.quantile(caused, CONFIDENCE, method="higher")) if caused.size else np.nan
 
 
 def _caused(residuals: FloatArray, count: int) -> FloatArray:
-    """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples."""
+    """Return the rms residuals that scatter and errors alone cause, one per resample.
+
+    The result is empty for fewer than two realisations, or too few resamples.
+    """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))
     known = away[:RESAMPLES][~np.isnan(away[:RESAMPLES])]

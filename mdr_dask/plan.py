@@ -121,7 +121,11 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the approximate number of operations of a block, counted for the first realisations of its cases."""
+        """Return the approximate number of operations of a block.
+
+        The operations are counted for the first realisations of its cases. If the last block along ``realisation`` is
+        shorter, they are reduced in proportion.
+        """
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
         first, known = (*cases, 0), self._known
@@ -228,7 +232,8 @@ def templates(
     """Return the template of every series.
 
     `stored_chunks` contains the chunk lengths of the series that are already in the store. Raise CampaignError if the
-    masks of a series do not fit into the memory. Raise ModelError if the model gives no coordinates for a dimension.
+    ledger and the masks of a series do not fit into the memory. Raise ModelError if the model gives no coordinates for
+    a dimension.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -284,8 +289,9 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the length of a block along each dimension.
 
     A block first gets all values of the axes along which cases share work. A block that is too large is halved along
-    these axes. A block with few operations gets more realisations, then more values of other axes, and finally the
-    realisations of later rounds. Lengths in `blocks` of the campaign replace the computed lengths.
+    these axes. A block with few operations gets more realisations, then more values of other axes. If one block then
+    contains the whole first round, it may also get realisations of later rounds. Lengths in `blocks` of the campaign
+    replace the computed lengths.
     """
     shared = (
         axis.dim for path in model.whole for axis in template.series.axes if f"{axis.path}.".startswith(f"{path}.")

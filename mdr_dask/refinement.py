@@ -1,9 +1,10 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Every new value lies halfway between two older values on the scale of the axis. Cases that differ in other parameters
-therefore share values of the axis. To test an interval, the output inside it is predicted from the results at the
-values that are older than its newer end. The interval is halved if this prediction differs from the interpolation of
-all results by more than the tolerance.
+Every new value lies halfway between two neighbouring values on the scale of the axis. Cases that differ in other
+parameters therefore share values of the axis. The ends of the axis have level 0, the middle has level 1, the quarters
+have level 2, and so on. To test an interval, the output inside it is predicted from the results at values whose level
+is below the higher of the levels of its two ends. The interval is halved if this prediction differs from the
+interpolation of all results by more than the tolerance.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ FINEST = 2.0**-10
 #: correctly by chance.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values: distances from
-#: the end that was added to the axis later, as fractions of the length of the interval. Chosen by trial.
+#: the end with the higher level, as fractions of the length of the interval. Chosen by trial.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
@@ -156,9 +157,10 @@ class _Interval:
 def refined(mesh: Mesh, means: Mapping[str, Means]) -> tuple[Mesh, dict[str, int]]:
     """Halve the intervals in which no test has yet shown that interpolation meets the tolerances; return the new mesh.
 
-    An interval is not halved if its width is `FINEST`, or if its combination of non-adaptive values already needs the
-    largest allowed number of values. `means` contains the means of each output that has a tolerance. Also return, for
-    each adaptive axis, how many combinations of non-adaptive values have such intervals, but none that may be halved.
+    These are the intervals from `_intervals`. An interval is not halved if its width is `FINEST`, or if its combination
+    of non-adaptive values already needs the largest allowed number of values. `means` contains the means of each output
+    that has a tolerance. Also return, for each adaptive axis, for how many combinations of non-adaptive values there
+    are intervals from `_intervals`, but none is halved.
     """
     found, short = mesh, {}
     for number in mesh.shares:
@@ -173,8 +175,10 @@ def refined(mesh: Mesh, means: Mapping[str, Means]) -> tuple[Mesh, dict[str, int
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve, so that the adaptive axis has at most `at_most` values for all other parameters.
+    """Return the intervals to halve.
 
+    For each combination of non-adaptive values, the adaptive axis then has at most `at_most` values, unless it already
+    had more.
     The widest intervals are chosen first, so that one discontinuity does not use up all values.
     """
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
@@ -204,7 +208,11 @@ def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
 
 
 def _intervals(mesh: Mesh, number: int, means: Mapping[str, Means]) -> Iterator[_Interval]:
-    """Yield the untested intervals of an adaptive axis, and those in which interpolation misses a tolerance."""
+    """Yield the untested intervals of an adaptive axis, and those in which interpolation misses a tolerance.
+
+    An interval is left out if every row has a failed case at an end (see `_excess`), or if the axis has whole numbers
+    and none lies between the ends.
+    """
     refinement = mesh.refinement(number)
     masks = {k: mesh.used(k) for k in mesh.shares}
     for case in np.ndindex(masks[number].shape[:-1]):

@@ -1,8 +1,8 @@
 """The class `Fit`: a law, with a function that fits the constants of the law to a store and tests the law.
 
-Every result has a sentence ``law_holds`` on whether the law holds with the constants that the publication of the law
-states. The sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, a second
-sentence ``fitted_law_holds`` says whether the law holds with the fitted constants.
+Every result has a sentence ``law_holds`` on whether the law holds. If the publication of the law states constants, the
+law is tested with these constants. The sentence begins with *yes*, *approximately*, *no* or *not tested*. Some fits add
+a sentence ``fitted_law_holds`` on whether the law holds with the fitted constants.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ class Fit:
     """A law that ``mdr-dask fit STORE NAME`` fits to the stores of some `models`; an empty tuple means all models.
 
     `compute` takes the series of a store, indexed by name. A series has the dimensions (axes..., realisation, ...), and
-    all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 %
-    intervals of the constants (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``.
-    The attrs of each variable contain its unit. If `apart` is true, `compute` takes one series at a time.
+    all scalar parameters as coordinates. `compute` returns constants, the ends of the 95 % intervals of the constants
+    (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``. Without ``law_holds``, the
+    law counts as *not tested*. The attrs of each variable contain its unit. If `apart` is true, `compute` takes one
+    series at a time.
     """
 
     name: str
@@ -52,7 +53,7 @@ class Fit:
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         """Fit a store, and return the results, indexed by the name of the series (``""`` for all series together).
 
-        A series that cannot be fitted is left out. FitError is raised if no series can be fitted.
+        If `apart` is true, a series that cannot be fitted is left out. FitError is raised if nothing can be fitted.
         """
         if not self.apart:
             return {"": self._result(groups)}
@@ -73,7 +74,10 @@ class Fit:
 
 @contextmanager
 def faults_named(what: str, function: Callable[..., Any]) -> Iterator[None]:
-    """Turn an unexpected exception of the function of a law or a figure into a CodeError that names its module."""
+    """Turn an unexpected exception of the function of a law or a figure into a CodeError that names the module.
+
+    Exceptions of the classes MdrDaskError and OSError are expected, and are not changed.
+    """
     try:
         yield
     except (MdrDaskError, OSError):
@@ -111,7 +115,7 @@ class Fitted:
 
     `constants`, shape (rows, p), and `residuals` (data minus law), shape (rows, cases), are stacks. The stack of
     constants may have more rows, for data that are shifted by the residuals. Constants that the data do not determine
-    are NaN. `count` is the number of realisations that were resampled.
+    are NaN. `count` is the smallest number of successful realisations of a case.
     """
 
     constants: FloatArray
@@ -127,7 +131,7 @@ class Fitted:
         """Return a sentence on whether the law with the fitted constants holds; ``where(k)`` describes case k."""
         if np.isnan(self.constants[0]).any():
             departs = _size(100 * self.rms, np.nan, logarithmic=True)
-            return f"not tested: these cases do not determine the constants; departs by {departs} rms"
+            return f"not tested: these cases do not determine all constants; departs by {departs} rms"
         return verdict(self.residuals, self.count, self.constants.shape[1], where, logarithmic=True)
 
 
@@ -200,13 +204,13 @@ def verdict(
 
 
 def excludes(stack: FloatArray, count: int, stated: float) -> bool:
-    """Return whether a stated value lies outside the interval of a constant."""
+    """Return whether a stated value lies outside the interval of a constant; false if the interval is unknown."""
     low, high = bootstrap.interval(stack, count)
     return bool(stated < low or stated > high)
 
 
 def short(number: float) -> str:
-    """Return a number with two digits: ``550``, ``0.023``."""
+    """Return a number as text with two significant digits, such as ``550`` or ``0.023``."""
     return f"{float(f'{number:.2g}'):g}"
 
 

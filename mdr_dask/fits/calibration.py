@@ -45,7 +45,8 @@ from mdr_dask.units import shown
 
 #: If the table contains no measurement errors, or errors that do not explain the residuals, a calibration tries
 #: `DEVIATIONS` sizes of the measurement error. The smallest size is `LEAST` times the rms residual of the best
-#: prediction, because the scatter of the lines may cause most of the residual. Chosen by trial.
+#: prediction, because the scatter of the lines may cause most of the residual. No size is smaller than the measurement
+#: error in the table. Chosen by trial.
 LEAST, DEVIATIONS = 0.2, 14
 
 
@@ -54,8 +55,8 @@ class Calibration:
     """The result of a calibration.
 
     `noises` are the possible measurement errors, and `units` the units of unknowns, conditions and output. If the
-    measurement errors in the table do not explain the residuals, `contradicted` contains the residuals. The posterior
-    then uses larger measurement errors, and the intervals include the misfit.
+    measurement errors in the table do not explain the residuals, `contradicted` contains the residuals of a calibration
+    with these errors. The posterior then uses larger measurement errors, and the intervals include the misfit.
     """
 
     measured: Measured
@@ -97,7 +98,7 @@ class Calibration:
 
     @cached_property
     def residuals(self) -> Residuals:
-        """Residuals of the prediction for the most probable unknowns."""
+        """Residuals of the prediction for the most probable unknowns; `contradicted` if it is not None."""
         if self.contradicted is not None:
             return self.contradicted
         measured, predicted = self.measured, self.prediction(self.posterior.places[[self.posterior.best]])
@@ -138,8 +139,8 @@ class Calibration:
 def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     """Estimate the one to four unknowns of a grid study from measured points.
 
-    The prior of an unknown is uniform over the axis of the unknown. If the axis is spaced logarithmically, the prior is
-    uniform over the logarithm of the unknown. The measured values are assumed to be normally distributed about the
+    The prior of an unknown is uniform over the range of its axis. If the axis is spaced logarithmically, the logarithm
+    of the unknown has the uniform prior. The measured values are assumed to be normally distributed about the
     prediction. The covariance of the measured values has three parts: measurement errors; scatter of the rough lines,
     most of which is common to all points; and errors of grid and interpolation. The error of grid and interpolation of
     a point is the sum of two equal parts: one part is common to all points, and the other part is independent for each
@@ -148,6 +149,10 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     If the table contains no measurement errors, the logarithm of the size of the measurement errors has a uniform
     prior. The measurement errors are then assumed to be either equal for all points or, if all measured values are
     positive, proportional to the predicted values.
+
+    If the table contains measurement errors that do not explain the residuals, the calibration is repeated with larger
+    measurement errors. Raise FitError if a measurement error in the table is 0, if there are too few points, or if the
+    study is not suitable (see `prediction`).
     """
     if measured.errors is not None and not measured.errors.all():
         raise FitError(f"{measured.source}: {ZERO}")
@@ -322,7 +327,7 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 
 
 def sentence(found: Calibration) -> str:
-    """Return a sentence on which unknowns the data determine, and on whether the model explains the data."""
+    """Return a sentence on which unknowns the data determine; it also says if the model does not explain the data."""
     start = (
         "the model does not explain the measured points; with errors large enough to explain the residuals, "
         if found.law_holds.startswith("no:")

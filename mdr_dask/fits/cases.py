@@ -32,7 +32,8 @@ def each(
 
     A group contains all cases along the dimensions that the function `inner` returns. There is one group for each
     combination of values along the other dimensions. A variable that `fit` does not return for a group is NaN or an
-    empty text there. The first output must have no dimensions except the axes of the study and ``realisation``.
+    empty text there. The first output must have no dimensions except the axes of the study and ``realisation``. Raise
+    FitError if the series lacks one of the outputs.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -63,7 +64,8 @@ def one_value(data: xr.Dataset, name: str) -> float:
     values = data[name]
     if values.size != 1:
         raise FitError(
-            f"expected the same {name} in all cases, or an axis for it, got a sampled study with {values.size} values"
+            f"expected the same {name} in all cases, or a separate axis for it, got {values.size} values that vary "
+            "together with other parameters"
         )
     return float(values.item())
 
@@ -85,7 +87,8 @@ class Table(NamedTuple):
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
         """Return the logarithms of the means of the `used` cases, as a stack.
 
-        The logarithm is shifted by the relative discretisation error, and by 1 if this error is infinite.
+        In the last rows of the stack, the logarithms are shifted by the relative discretisation errors. A logarithm
+        with an infinite error is shifted by 1.
         """
         means = bootstrap.means(self.values[used].T)
         relative = self.mean_error(used) / means[0]

@@ -29,8 +29,8 @@ def laws_of(
     `result.groups` contains the temperature, or the other number, that distinguishes each curve from the others. If the
     groups are temperatures, the laws are Arrhenius' law and the WLF law of log10 a_T. If the groups are other positive
     numbers, such as velocities, the law is a power law. All laws are fitted relative to the middle group, so that the
-    fit does not depend on the reference. If no law can be fitted, there are no fitted laws, and a sentence may state
-    the reason.
+    fit does not depend on the reference. If one of the laws cannot be fitted, no law is returned, and the only sentence
+    states the reason. If the groups are numbers that are not all positive, neither a law nor a sentence is returned.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]

@@ -29,8 +29,8 @@ def read_table(path: str | Path) -> pd.DataFrame:
     """Read a table of numbers below a row of names.
 
     Columns of words are left out. ``attrs["units"]`` contains the units if the table has a row of units. The index
-    contains the place of each row in the file, as the beginning of a message. Storage and loss modulus are added if
-    other columns determine them.
+    contains the place of each row in the file, as the beginning of a message. If the storage or the loss modulus is
+    missing, it is added if other columns determine it.
     """
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
@@ -49,7 +49,10 @@ def read_table(path: str | Path) -> pd.DataFrame:
 
 
 def _with_moduli(table: pd.DataFrame) -> pd.DataFrame:
-    """Add storage and loss modulus to a table with other columns that determine these moduli, such as tan delta."""
+    """Add a missing storage or loss modulus to a table with columns that determine it, such as tan delta.
+
+    A table that has both moduli, or does not determine them, is returned unchanged.
+    """
     names = {name: column_of(table, name) for way in WAYS for name in way}
     way = next((way for way in WAYS if None not in [names[name] for name in way]), WAYS[0])
     if way == WAYS[0]:
@@ -73,7 +76,7 @@ def _with_moduli(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
-    """Convert a study into a table of means over realisations, one row for each case. Return a table as it is."""
+    """Convert a study into a table of means over realisations, one row for each case. Return a DataFrame unchanged."""
     if isinstance(table, pd.DataFrame):
         return table
     mean = table.mean("realisation", keep_attrs=True) if "realisation" in table.dims else table
@@ -98,10 +101,8 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
     """Return the column with the wanted name.
 
-    If no column has this name, return the first column whose name is a synonym.
-
-    Return None if no name is a synonym, or if several names are synonyms but the columns do not contain the same
-    quantity.
+    If no column has this name, return the first column whose name is a synonym, perhaps with a unit. Return None if
+    there is no such column, or if there are several that do not contain the same quantity.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -158,9 +159,7 @@ def columns_to_use(
     varied = [names for names in found if all(frame[name].nunique() > 1 for name in names[:2])]
     if found and not varied:
         constant = next(name for name in found[0][1::-1] if frame[name].nunique() < 2)
-        raise DataError(
-            f"expected curves at two or more values of {constant!r}, got one value: there is nothing to shift"
-        )
+        raise DataError(f"expected two or more values of {constant!r}, got one value: there are no curves to shift")
     if not found:
         got = [str(name) for name in frame.columns]
         lacking = [name for name in (abscissa, *(wished or ()), group) if name and column_of(frame, name) is None]
@@ -240,10 +239,10 @@ def curves_of(
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
     """Return the index of the nominal value of each measured value; measured values scatter about nominal values.
 
-    The sorted values are divided at the wide gaps. If the gaps are nearly equal, each distinct value is a group of its
-    own. The same holds if values are repeated: each at least twice, or three times on average. But repeated values that
-    are close to each other form one group, as rounded readings of one nominal value, if they alternate and no abscissa
-    occurs twice in a group.
+    The sorted values are divided at the wide gaps. If the gaps are nearly equal, or if there are fewer than three
+    distinct values, each distinct value is a group of its own. The same holds if values are repeated: each at least
+    twice, or three times on average. But repeated values that are close to each other form one group, as rounded
+    readings of one nominal value, if they alternate and no abscissa occurs twice in a group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

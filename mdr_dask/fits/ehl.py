@@ -29,7 +29,10 @@ def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
 
 
 def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit ln(h/R) linearly to ln W, ln U and ln G; return constants, half widths of 95 % intervals, and residuals."""
+    """Fit ln(h/R) linearly to ln W, ln U and ln G; return constants, half widths of 95 % intervals, and residuals.
+
+    Constants that the data do not determine are NaN. Raise FitError if there are too few film thicknesses.
+    """
     from scipy.stats import t
 
     design = np.vstack([np.ones(table.shape[1]), table[:3]]).T
@@ -54,9 +57,10 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
-    The exponent of a number (W, U or G) is NaN if the data do not determine it, for example because the number does not
-    vary or is a product of powers of the other two numbers. The intervals follow from the misfit, because computed film
-    thicknesses have no scatter. ``law_holds`` is about the formula of Pan and Hamrock.
+    A film thickness that the study does not contain is left out. A constant is NaN if the data do not determine it, for
+    example the exponent of a number (W, U or G) that does not vary or is a product of powers of the other two. The
+    intervals follow from the misfit, because computed film thicknesses have no scatter. ``law_holds`` is about the
+    formula of Pan and Hamrock.
     """
     found: Variables = {}
     departures, of_stated = [], []

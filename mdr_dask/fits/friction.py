@@ -110,13 +110,13 @@ def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
 
 
 def loads_of_zone_one(force: FloatArray, known: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Return, for each load in zone 1, the indices of the cases with this load."""
+    """Return, for each load in zone 1, the indices of the `known` cases with this load."""
     inside = (force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & known
     return [np.flatnonzero((force == load) & known) for load in np.unique(force[inside])]
 
 
 def _zone_one(data: xr.Dataset) -> Variables:
-    """Fit the power law of mu / v against the load, in zone 1 and region I."""
+    """Fit a power law to mu / v as a function of the load, with one case in region I for each load in zone 1."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     rate = table.mean() / (np.sqrt(2) * velocity)
@@ -128,8 +128,8 @@ def _zone_one(data: xr.Dataset) -> Variables:
             used.append(ordered[at])
     if len(used) < 3:
         raise FitError(
-            f"expected three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]} and velocities down to region I,"
-            f" got {len(used)}: add lower loads or velocities"
+            f"expected at least three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]} and velocities down to"
+            f" region I, got {len(used)}: add lower loads or velocities"
         )
     x, count, stated = np.log(force[used]), table.count(used), laws.alpha(one_value(data, "hurst"))
     logs = table.logarithms(used) - np.log(np.sqrt(2) * velocity[used])
@@ -153,7 +153,9 @@ def _plateau(data: xr.Dataset) -> Variables:
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
     if velocity.size < 3 or not table.mean()[known].max() > 0:
-        raise FitError(f"expected friction at three or more velocities, to find its maximum, got {velocity.size}")
+        raise FitError(
+            f"expected friction at three or more velocities, with a positive maximum, got {velocity.size} velocities"
+        )
     known = known[np.argsort(velocity)]
     x, count, stack = np.log(table.columns[0][known]), table.count(known), table.stack(known)
     found = top.highest(x, stack, count)
@@ -230,7 +232,10 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which `known` cases are in regions I to III, up to the velocity of the largest friction at each load."""
+    """Return which `known` cases are in regions I to III: up to the velocity of the largest friction at each load.
+
+    The largest friction is found on a smoothed curve. Cases whose friction is not positive are left out.
+    """
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))
@@ -241,13 +246,13 @@ def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDA
 
 
 def _interpolation(data: xr.Dataset) -> Variables:
-    """Fit alpha and beta of eq. 3.17 to the logarithms of friction in regions I to III."""
+    """Fit alpha and beta of eq. 3.17 to the logarithms of friction in regions I to III, without loads below zone 1."""
     table = table_of(data, np.sqrt(2) * spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     used = rising(force, velocity, np.nan_to_num(table.mean()), force >= ZONE_ONE[0])
     if np.count_nonzero(used) < 5 or np.unique(velocity[used]).size < 3:
         raise FitError(
-            f"expected at least five cases with F_N / (G h L) above {ZONE_ONE[0]} and velocities up to the maximum of "
+            f"expected at least five cases with F_N / (G h L) >= {ZONE_ONE[0]} and velocities up to the maximum of "
             f"friction, at three or more velocities, got {int(used.sum())} at {np.unique(velocity[used]).size}"
         )
     force, velocity, count = force[used], velocity[used], table.count(used)

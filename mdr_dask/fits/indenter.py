@@ -29,7 +29,7 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
     if "indenter_coefficient" in data.coords and data["indenter_exponent"].ndim == 0:
         exponent = one_value(data, "indenter_exponent")
         return PowerLaw.of_body(1.0, exponent).coefficient * data["indenter_coefficient"], exponent
-    raise FitError("expected a store with an indenter: cone, parabola or power")
+    raise FitError("expected a store with an indenter: cone, parabola, or power with one exponent")
 
 
 def _half_width(data: xr.Dataset) -> Any:
@@ -59,9 +59,9 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The law neglects the slope of the indenter. Its rms slope must therefore be at most `SMALL` times that of the
-    roughness. The indenter must be pressed in by at least the rms height. If the velocity is an axis, it must not
-    exceed the velocity at which friction is largest.
+    The law neglects the slope of the indenter. The rms slope of the indenter in the contact must therefore be at most
+    `SMALL` times the rms slope `slope` of the roughness. The indenter must be pressed in by at least the rms height. If
+    the velocity is an axis, it must not exceed the velocity at which friction is largest.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
@@ -75,7 +75,10 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 
 
 def _indenter(data: xr.Dataset) -> Variables:
-    """Fit the exponent of eq. 3.40; the constants are NaN if the law applies to fewer than three cases."""
+    """Fit the exponent of eq. 3.40.
+
+    If the law applies to fewer than three cases, the exponent and the deviations from the law are NaN.
+    """
     slope = spectral_slope(data)
     table = table_of(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
     xi, within = table.columns

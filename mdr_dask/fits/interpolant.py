@@ -15,11 +15,12 @@ from mdr_dask.models.base import Status
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
 
-    The mean over realisations is interpolated by monotone cubics (PCHIP) along one axis after the other. Each axis is
-    linear or logarithmic, as `Scale.of` chooses, and needs at least `FEWEST` values. An axis of words receives no new
-    values. The error is the half width of the 95 % interval of the mean plus two errors of interpolation: that of the
-    cubics, estimated by leaving out every second value, and that of linear interpolation in the dense table. Raise
-    FitError if a case has no value.
+    The mean over realisations, or its logarithm, is interpolated by monotone cubics (PCHIP) along one axis after the
+    other. Each axis is linear or logarithmic. `Scale.of` chooses these scales. An axis of numbers needs at least
+    `FEWEST` values; an axis with a single value is removed. An axis of words receives no new values. The error is the
+    half width of the 95 % interval of the mean plus two errors of interpolation: that of the cubics, estimated by
+    leaving out every second value, and that of linear interpolation in the dense table. Raise FitError if the study is
+    no grid, if an axis has too few values, or if a needed case has no value.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -56,6 +57,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
     """Return the mean of an output over the realisations, and the half width of the 95 % interval of the mean.
 
+    If the output does not have the dimension ``realisation``, the output itself and half widths of 0 are returned.
     Where the interval is unknown, the discretisation error replaces the half width; if this error is unknown too, the
     half width is 0. Raise FitError if a case that is needed has no value.
     """
@@ -78,7 +80,10 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that an adaptive axis left out."""
+    """Interpolate the cases that an adaptive axis left out.
+
+    Along an axis with fewer than `FEWEST` known values, and outside the known values, nothing is interpolated.
+    """
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice: values interpolated along one axis may allow interpolation along a previous axis

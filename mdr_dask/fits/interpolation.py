@@ -12,12 +12,12 @@ from mdr_dask.arrays import FloatArray
 #: Smallest number of values along an axis. If every second value is left out, the remaining values must still determine
 #: a curve.
 FEWEST = 4
-#: Error of interpolation with all values, divided by the error with every second value only. The ratio is 1/4 for an
-#: error of second order, and 1/2 at a kink.
+#: Assumed error of interpolation with all values, divided by the error with every second value only. The ratio is 1/4
+#: for an error of second order, and 1/2 at a kink.
 LEFT = 0.25
 #: `LARGEST`: largest number of values in a dense table; these are 16 MB. `PIECES`: largest number of steps into which
 #: the interval between two computed values of an axis is divided. With 16 steps, the error of linear interpolation is
-#: 256 times smaller.
+#: 256 times smaller than with one step.
 LARGEST, PIECES = 2_000_000, 16
 
 
@@ -93,8 +93,9 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Estimate the error of interpolation at every value of an axis (`places`) by leaving out every second value.
 
-    `table` contains numbers converted to `scale`. The result is the error of the unconverted numbers. Each
-    error is the largest of three estimates: at the value itself and at its two neighbours.
+    `table` contains numbers converted to `scale`. The result is the error of the unconverted numbers. Each error is
+    `LEFT` times the largest of three deviations: at the value itself and at its two neighbours, each when it is left
+    out.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)

@@ -87,7 +87,10 @@ class Jumps(NamedTuple):
     counts: NDArray[np.intp]
 
     def count(self, used: NDArray[np.bool_]) -> int:
-        """Return the smallest number of successful realisations of the `used` cases."""
+        """Return the smallest number of successful realisations of the `used` cases.
+
+        If no case is used, return the largest integer.
+        """
         return int(self.counts[used].min(initial=np.iinfo(np.intp).max))
 
     def numbers(self) -> dict[str, FloatArray]:
@@ -138,15 +141,16 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 
 
 def _jump_law(data: xr.Dataset) -> Variables:
-    """Fit the constant c of eq. 4.11 to all cases in which friction does not fall with the velocity.
+    """Fit the constant c of eq. 4.11 to all cases in which friction does not fall significantly with the velocity.
 
-    The function also tests eq. 4.9 in region I, and eq. 4.10 on the plateau of friction.
+    The fit leaves out cases in which mu_1 or d_mu_0 / dv is zero or negative in a row of the stack. The function also
+    tests eq. 4.9 in region I, and eq. 4.10 on the plateau of friction.
     """
     jumps = jumps_of(data)
     numbers = jumps.numbers()
     before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
     highest = bootstrap.interval(numbers["xi"], jumps.counts)[1]
-    rising = np.isfinite(highest) & (highest >= 0)  # cases in which friction does not fall with the velocity
+    rising = np.isfinite(highest) & (highest >= 0)  # cases in which friction does not fall significantly
     known = rising & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     slow, fast = (before[0] < REGION_ONE) & np.isfinite(zeta[0]), (before[0] > PLATEAU) & rising
     if np.count_nonzero(known) < 2 and not slow.any() and not fast.any():

@@ -109,7 +109,7 @@ def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the nearest group if the reference lies just outside the groups.
 
     Because measured values scatter, the reference may lie outside the groups by up to a tenth of the mean step between
-    groups.
+    groups. Raise DataError if it lies farther outside.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:

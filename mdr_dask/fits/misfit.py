@@ -37,7 +37,8 @@ class Residuals(NamedTuple):
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
     """Return a sentence (*yes*, *no* or *not tested* with a reason) on whether the model explains the measured points.
 
-    The model is *not tested* if the errors would hide any misfit, or if there are too few points.
+    The sentence is *not tested* instead of *yes* if the errors would hide any misfit. With too few points, it is always
+    *not tested*.
     """
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (
@@ -61,12 +62,12 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
     if residuals.errors > APPROXIMATE:
         return hidden
     if is_trend:
-        return f"yes: the residuals have a trend along {along} {about}, which is less than {100 * WITHIN:g} %"
+        return f"yes: the residuals have a trend along {along} {about}, which is at most {100 * WITHIN:g} %"
     return f"yes: the residuals have no significant trend {about}"
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that a trend of the residuals is due to chance, and the condition with the trend.
+    """Return the probability that a trend of the residuals is due to chance, and the condition with the clearest trend.
 
     For each condition, a parabola is fitted to the residuals against the rank of the condition's value.
     The smallest probability is multiplied by the number of conditions, because every condition is another chance to

@@ -1,7 +1,7 @@
 """The posterior density of a few unknowns, and which unknowns or products of unknowns it determines.
 
 The range of each unknown, on the scale of its axis, is mapped to the interval from 0 to 1. The unit cube is divided
-into cells, and cells of high density are divided further.
+into cells. Cells of high density are divided further, and the other cells are left out.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ CELLS = 512
 #: Largest number of cells after a refinement; limits the time.
 MOST = 160_000
 #: A refinement leaves out cells in which ln(density) is below its maximum by more than this value, but it keeps at
-#: least `CELLS` cells. The total probability of the cells left out is below 1e-5.
+#: least `CELLS` cells. In the cells left out, the density is less than 1e-6 times the largest density.
 REACH = 14.0
 #: Refinement ends when ln(density) varies within a divided cell by less than this value on average. The weights of the
-#: average are the probabilities of the cells. Chosen by trial.
+#: average are the probabilities of the cells. Refinement also ends when the cells are at most `CLOSE` wide. Chosen by
+#: trial.
 SMOOTH = 0.6
 #: An end of the axis of an unknown is *open* if ln(largest posterior density / density at the end) is less than `OPEN`:
 #: the 95 % interval of the likelihood-ratio test reaches this end.
@@ -123,7 +124,11 @@ class Posterior(NamedTuple):
 
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
-    """Return the posterior density on cells of the unit cube, from the result of `likelihood` and a uniform prior."""
+    """Return the posterior density on cells of the unit cube, for a uniform prior of the unknowns.
+
+    The argument `likelihood` takes points, shape (cells, unknowns), and returns logarithms of the likelihood, shape
+    (cells, number of sizes of the measurement error).
+    """
     number = round(CELLS ** (1 / unknowns))
     width = 1.0 / number
     axis = (np.arange(number) + 0.5) * width
@@ -162,7 +167,10 @@ def _is_smooth(pieces: FloatArray) -> bool:
 
 
 def at_ends(found: Posterior) -> FloatArray:
-    """Return ln(density / largest density) at both ends of the axis of each unknown, shape (unknowns, 2)."""
+    """Return ln(density / largest density) at both ends of the axis of each unknown, shape (unknowns, 2).
+
+    The logarithm is minus infinity if no cell lies at the end.
+    """
     borders = np.stack([found.places < found.width, found.places > 1 - found.width], axis=-1)
     density = np.where(borders, found.density[:, None, None], -np.inf)
     return np.asarray(density.max(axis=0) - found.density.max())
@@ -206,7 +214,8 @@ class Product(NamedTuple):
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
     """Return the products that the data determine. Their factors are powers of the undetermined unknowns `free`.
 
-    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns).
+    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns). The list is empty if
+    there are fewer than two undetermined unknowns, or if the value of such an unknown is not positive in every cell.
     """
     if len(free) < 2 or np.any(values[:, free] <= 0):
         return []
@@ -222,7 +231,7 @@ def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[
 
 
 def _reduced(rows: FloatArray) -> FloatArray:
-    """Return rows that span the same space as `rows`, each with a leading 1 and as few other terms as possible."""
+    """Return rows that span the same space; each has a 1 in a column in which all other rows are 0."""
     rows = rows.copy()
     done: list[int] = []
     for i in range(len(rows)):

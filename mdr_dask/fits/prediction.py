@@ -207,7 +207,8 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the part of the standard error that is independent for each case, and the modes of the common part.
 
-    All cases use the same rough lines. A few modes therefore represent most of the variance of all cases.
+    All cases use the same rough lines. A few modes therefore represent most of the variance of all cases. With a single
+    realisation, the independent part is 0, and there are no modes.
     """
     count = deviations.shape[-1]
     if count < 2:

@@ -216,7 +216,9 @@ def _relaxation(case: xr.Dataset) -> Variables:
         **measure("law_rate", expected, "rate b by eq. 4.12"),
         **_closed_law(case, expected),
         **measure(
-            "fitted_law_holds", found.holds if found else "not tested: nothing relaxes", "whether one exponential fits"
+            "fitted_law_holds",
+            found.holds if found else "not tested: too few realisations, or nothing relaxes",
+            "whether one exponential fits",
         ),
     }
 
@@ -262,6 +264,7 @@ def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, c
     """Fit a power law to rates on one side of v_1 tau q_max = 1; `x` is ln(v_1 tau q_max).
 
     `rates` is a stack. `error` contains the standard errors of ln(rate). `stated` is the exponent by eq. 4.12.
+    With fewer than three rates, the fitted constants are NaN.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"

@@ -54,7 +54,9 @@ def _contact_growth(data: xr.Dataset) -> Variables:
     force, velocity = table.columns
     used = [int(same[np.argmin(velocity[same])]) for same in loads_of_zone_one(force, table.mean() > 0)]
     if len(used) < 3:
-        raise FitError(f"expected three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]}, got {len(used)}")
+        raise FitError(
+            f"expected at least three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]}, got {len(used)}"
+        )
     x, count, stated = np.log(force[used]), table.count(used), 1 / (1 + one_value(data, "hurst"))
     logs, where = table.logarithms(used), at_load(force[used])
     found = power_law(x, logs, count)
@@ -71,7 +73,10 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return two ratios: slope in contact divided by slope of the line, and computed mu divided by mu of eq. 3.12."""
+    """Return two ratios: slope in contact divided by slope of the line, and computed mu divided by mu of eq. 3.12.
+
+    Return no variables if the study contains no slope in contact or no friction.
+    """
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -118,13 +123,13 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     fractions = table_of(data, 1.0, output="contact_fraction")
     used = np.flatnonzero((slopes.mean() > 0) & np.isfinite(contact_slope_law(fractions.mean(), hurst, points)))
     if used.size < 3:
-        raise FitError(f"expected three cases whose contact is longer than the shortest wave, got {used.size}")
+        raise FitError(f"expected at least three cases whose contact is longer than the shortest wave, got {used.size}")
     count = min(slopes.count(used), fractions.count(used))
     law = np.log(contact_slope_law(np.exp(fractions.logarithms(used)), hurst, points))
     found = linear(np.ones((1, used.size)), bootstrap.difference(slopes.logarithms(used), law), count)
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    # if all contact lengths are equal, any law with a fitted factor explains the slopes
+    # if all lengths in contact are nearly equal, any law with a fitted factor explains the slopes
     if np.ptp(np.log(fraction)) < WITHIN:
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
@@ -137,7 +142,10 @@ def _contact_slope(data: xr.Dataset) -> Variables:
 
 
 def _friction_of_slope(data: xr.Dataset) -> Variables:
-    """Test whether friction in region IV (velocities beyond the maximum) is proportional to the slope in contact."""
+    """Test whether friction in region IV (velocities beyond the maximum) is proportional to the slope in contact.
+
+    Return no variables if the study contains no friction, or lacks a parameter in `KELVIN`.
+    """
     if not {"friction_coefficient", *KELVIN} <= set(data.variables):
         return {}
     table = table_of(data, 1.0, *loads_and_velocities(data))
@@ -244,7 +252,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 def _collapse(data: xr.Dataset) -> Variables:
     """Shift the curves of friction against velocity onto one common curve.
 
-    Each load has one curve, which ends at the largest friction.
+    Each load has one curve, which ends at the largest friction. Curves with fewer than three velocities are left out.
     """
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
@@ -252,7 +260,8 @@ def _collapse(data: xr.Dataset) -> Variables:
     loads = np.array([load for load in np.unique(force) if np.count_nonzero(known & (force == load)) >= 3])
     if loads.size < 2:
         raise FitError(
-            f"expected at least two loads, each with three velocities up to the maximum of friction, got {loads.size}"
+            "expected at least two loads, each with three or more velocities up to the maximum of friction, got "
+            f"{loads.size}"
         )
     used = np.flatnonzero(known & np.isin(force, loads))
     x, curve, count = np.log(velocity[used]), np.searchsorted(loads, force[used]), table.count(used)

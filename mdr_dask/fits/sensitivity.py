@@ -28,7 +28,8 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
     First-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total indices Jansen (1999).
     A base point (see `_is_saltelli`) with a case without a value is left out of the indices that need this case. Raise
-    FitError if the study is no complete design, or if the output is the same in every case.
+    FitError if the study is no complete design of numerical inputs, if it has too few base points with values, or if
+    the output has further dimensions or is the same in every case.
 
     The intervals follow from a jackknife over groups of points and over realisations. The intervals tend to be too
     wide, because points of a Sobol sequence fill space more evenly than random points.

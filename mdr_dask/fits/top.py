@@ -27,10 +27,9 @@ def smoothed(mean: FloatArray) -> FloatArray:
 class Top(NamedTuple):
     """The maximum of a parabola near the largest friction, fitted to every row of a stack.
 
-    `height` is the maximum, corrected for its bias. It has additional rows for the residuals, which make its interval
-    wider.
-    `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum. `rise` is 0 unless
-    the maximum is at an end of the fitted range.
+    `height` is the maximum, corrected for its bias. It has additional rows, shifted by the residuals, which make its
+    interval wider. `place` is ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) at the maximum.
+    `rise` is 0 unless the maximum is at an end of the fitted range.
     """
 
     height: FloatArray

@@ -104,7 +104,7 @@ class Columns:
         return found
 
     def unknown(self, name: str) -> DataError:
-        """Return the error for an unknown name, or for a dimensionless number that cannot be computed."""
+        """Return the error for an unknown name, a formula, or a dimensionless number that cannot be computed."""
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
@@ -119,7 +119,11 @@ class Columns:
         return self._value(text, self.find)
 
     def _with_states(self, name: str) -> xr.DataArray | None:
-        """Return a column for use in a condition; ``status == failed`` is true for rows with a failed result."""
+        """Return a column for use in a condition, or None if it does not exist.
+
+        The column ``status`` gets several words in each row, so that ``status == failed`` is true for every row with a
+        failed result.
+        """
         found = self.find(name)
         if name != STATUS or found is None:
             return found
@@ -188,7 +192,11 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the state of every row as text, such as ``failed`` or, for several results, ``2 failed, 1 missing``."""
+    """Return the state of every row as text, such as ``failed`` or, for several results, ``2 failed, 1 missing``.
+
+    For several results, the states done and not needed are not listed. If all results have these states, the text is
+    ``done``.
+    """
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:
         status = dataset[STATUS]
         return status.copy(data=WORDS[status.to_numpy()]).drop_attrs()

@@ -28,7 +28,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Dimension of a column with several words in each row. A comparison is true if it is true for any word of the row.
+#: Dimension of a column with several words in each row. The comparison ``==`` is true if it is true for any word of the
+#: row.
 ALTERNATIVES = "alternatives"
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
 _PIECE = re.compile(r"\s*(\*\*|[*/^]|-?\d+|[^\W\d]\w*|[%°]\w*)")
@@ -53,8 +54,8 @@ class Value(NamedTuple):
     """The value of an expression: numbers in SI, words, or truth values.
 
     `dimension` is the physical dimension of the numbers in pint, such as length. It is None for words, truth values,
-    numbers that are typed without a unit, and columns whose unit is unknown to pint. Numbers without a dimension are in
-    SI if they are compared with a quantity or added to a quantity.
+    numbers that are typed without a unit, and columns whose unit is unknown to pint. If numbers whose dimension is None
+    are compared with a quantity or added to a quantity, they count as SI values of this quantity.
     """
 
     array: Any
@@ -221,7 +222,10 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Return where numbers agree within `SAME`, or where words are equal. A name that is not a column is a word."""
+        """Return where numbers agree within `SAME`, or where words are equal.
+
+        If one side is a word, a name on the other side that is not a column is a word too.
+        """
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

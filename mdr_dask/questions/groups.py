@@ -32,7 +32,8 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     their mean absolute value.
 
     `by` contains names of axes, or of columns of a sampled study. If `kept` is given, only cases where `kept` is true
-    are included. The result has the dimension ``group`` instead of the axes.
+    are included. The result has the dimension ``group`` instead of the axes, the variable ``cases`` with the number of
+    cases of each group, and the variable `COUNTS` instead of ``status``.
     """
     import xarray as xr
 

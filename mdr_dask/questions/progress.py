@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class Group(NamedTuple):
     """Messages of one series that differ only in their numbers.
 
-    `kind` is the state of the results, or ``warning`` if the results are done. `cases` is a text with the
-    range of each varied parameter over the results.
+    `kind` is the state of the results, or ``warning`` if the results are done. `cases` is a text with the range
+    of each varied parameter over the results.
     """
 
     series: str

@@ -31,8 +31,8 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     A selection is a name, ``=``, and values or ranges that are separated by commas, as in ``velocity=1 mm/s..1 m/s``,
     ``hurst=0.3,0.7`` or ``radius=..2``. The name is ``case``, ``realisation``, or the name of an axis, of a column of a
     sampled study or of a fixed parameter. Both ends of a range are included. If a number between two values of the axis
-    is selected, the nearest value is kept, and `tell` receives a message. DataError is raised for an unknown name, and
-    for a value or a range that selects nothing.
+    is selected, the nearest value is kept, and `tell` receives a message. A selection by a fixed parameter leaves the
+    group unchanged. DataError is raised for an unknown name, and for a value or a range that selects nothing.
     """
     units = written_units(str(dataset.attrs.get("campaign", "")))
     for text in selections:
@@ -91,8 +91,8 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
     """Keep the named outputs and their errors. Without names, keep all outputs with one number for each result.
 
-    The variable ``status`` is not kept. `tell` receives a message about the outputs that are left out without being
-    asked for. DataError is raised for an unknown name.
+    The variable ``status`` is not kept. Without names, `tell` receives a message about the outputs that are left out.
+    DataError is raised for an unknown name.
     """
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:

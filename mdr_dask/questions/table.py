@@ -35,12 +35,12 @@ ROWS = 2**16
 
 @dataclass(frozen=True)
 class Question:
-    """A question about a group of a study. Without statistics, the table has one row for each result.
+    """A question about a group of a study. If `statistics` is None, the table has one row for each result.
 
-    `where` is a condition on the means of cases; in a table without statistics, it is a condition on single
-    results. With `group_by`, the table has one row for each combination of values of the named axes. `sort` contains
-    columns or formulas, with a leading ``-`` for descending order. If `written` is true, axes and parameters are in the
-    units of the campaign file, unless `units` contains other units.
+    `where` is a condition on the means of cases or, in a table with one row for each result, on single results. With
+    `group_by`, the table has one row for each combination of values of the named axes. `sort` contains columns or
+    formulas, with a leading ``-`` for descending order. If `written` is true, axes and parameters are in the units of
+    the campaign file, unless `units` contains other units.
     """
 
     outputs: tuple[str, ...] = ()
@@ -153,13 +153,16 @@ class _Maker:
         return self._frame(rows)[1], keys
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
-        """Yield frames in the order of the axes. Each frame has about `most` rows or fewer."""
+        """Yield frames in the order of the axes. Each frame has at most `most` or, if `whole`, `ROWS` rows."""
         for _, rows in self._boxes(self._data, most, whole):
             if rows.sizes["row"]:
                 yield self._frame(rows)[0]
 
     def order(self) -> NDArray[np.intp]:
-        """Return, for each row of the sorted table, the position of this row in the unsorted table."""
+        """Return, for each row of the sorted table, the position of this row among all rows.
+
+        The rows that `where` leaves out are counted too.
+        """
         import pandas as pd
 
         question = self._question
@@ -181,7 +184,7 @@ class _Maker:
             yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
-        """Yield the rows of each box that meet the condition: their positions among all rows, and their data."""
+        """Yield the rows of each box that the table includes: their positions among all rows, and their data."""
         if whole and not data.chunks:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
@@ -253,7 +256,7 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Return the columns of a statistic, such as two columns for an interval."""
+    """Return the columns for an array: two for an interval, one for each quantile, or the array itself."""
     if "bound" in array.dims:
         return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
     if "quantile" in array.dims:

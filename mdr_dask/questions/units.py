@@ -12,7 +12,7 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Suffixes of statistics that are converted like the output itself: the mean of 300 K is 26.85 degC.
+#: Suffixes of statistics that are converted like the output itself: a mean of 300 K is a mean of 26.85 degC.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
 #: Suffixes of statistics that are differences between values of an output: an error of 5 K is an error of 5 degC.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")

@@ -97,7 +97,7 @@ def test_nothing_relaxes_in_full_contact() -> None:
     still = data["friction_coefficient_before"] + data["friction_coefficient_jump"]
     flat = still.expand_dims(relaxation_times=TIMES, axis=-1)
     found = FIT["relaxation"].compute({"": data.assign(friction_coefficient_after=still, friction_coefficient=flat)})
-    assert found["fitted_law_holds"].values.tolist() == ["not tested: nothing relaxes"]
+    assert found["fitted_law_holds"].values.tolist() == ["not tested: too few realisations, or nothing relaxes"]
     assert np.all(np.isnan(found["rate"]))
 
 
