@@ -46,6 +46,7 @@ from mdr_dask.units import expected, likely, shown, to_si
         ("1 cSt", "m^2/s", 1e-6),
         ("1.5 min", "s", 90.0),
         ("1 in", "m", 0.0254),
+        ("100 kJ/mol", "J/mol", 1e5),
     ],
 )
 def test_quantities_become_si(written, unit, value):

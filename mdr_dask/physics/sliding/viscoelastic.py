@@ -246,7 +246,7 @@ def solve_sliding(
     elements enter undeformed and recover beyond the end of the line, and the depth is the only unknown. `unknown`
     contains first guesses of the stretches e_m at the first node, then of the depth. The guesses are replaced by the
     solution. `totals` receives `Passage.totals` of the last sweep. Return an `Outcome`, which is `OUTSIDE_LINE` if an
-    element is in contact at the end of a line that is not periodic.
+    element is in contact at an end of a line that is not periodic.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     terms, nodes = moduli.size, profile.size
@@ -267,7 +267,8 @@ def solve_sliding(
         start = unknown[:terms]
         pieces, ends_in_contact = sweep_line(penetration, start, solid, not periodic, passage, of_sweep)
         if is_last:
-            return Outcome.CONVERGED if periodic or not ends_in_contact else Outcome.OUTSIDE_LINE
+            leaves_line = not periodic and (penetration[0] > 0 or ends_in_contact)
+            return Outcome.OUTSIDE_LINE if leaves_line else Outcome.CONVERGED
         found = passage.lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:

@@ -97,9 +97,10 @@ def test_smooth_parabola_is_its_closed_form(velocity):
     assert state.error < 0.02
 
 
-def test_contact_that_leaves_the_line_is_a_status():
+@pytest.mark.parametrize("load", [10.0, 0.64])  # at 0.64 N, the contact leaves the line only where elements enter
+def test_contact_that_leaves_the_line_is_a_status(load):
     x = np.linspace(-1e-3, 1e-3, 401)
-    state = material_on_line(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), 0.1, 10.0, periodic=False)
+    state = material_on_line(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), 0.2, load, periodic=False)
     assert state.status == Outcome.OUTSIDE_LINE
     assert np.isnan(state.friction_coefficient)
 
