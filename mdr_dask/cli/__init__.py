@@ -27,10 +27,21 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
-#: Groups of commands in ``--help``. All other commands are listed last.
+#: Groups of commands in ``--help``, with one line for each command. All other commands are listed last.
 GROUPS = {
-    "study": ("check", "run", "status", "verify"),
-    "answers": ("show", "fit", "master-curve", "plot", "report"),
+    "study": {
+        "check": "check campaign files, and estimate the cost",
+        "run": "compute all results that are missing",
+        "status": "show progress, failures and messages",
+        "verify": "read every file of a store, and list faults",
+    },
+    "answers": {
+        "show": "show results as a table",
+        "fit": "fit laws, or calibrate unknown parameters",
+        "master-curve": "shift curves into one master curve",
+        "plot": "draw figures",
+        "report": "write one page about a study",
+    },
 }
 
 
@@ -39,10 +50,9 @@ class Commands(click.Group):
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each command of a group with one line of help, and then the names of all other commands."""
-        limit = formatter.width - 6 - max(map(len, self.commands))  # as in click.Group
-        for title, names in GROUPS.items():
+        for title, lines in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(limit)) for name in names])
+                formatter.write_dl(list(lines.items()))
         others = [name for name in sorted(self.commands) if not any(name in names for names in GROUPS.values())]
         with formatter.section("more"):
             formatter.write_text(f"{', '.join(others)}; each with --help")
