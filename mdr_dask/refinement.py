@@ -2,9 +2,9 @@
 
 Every new value lies halfway between two neighbouring values on the scale of the axis. Cases that differ in other
 parameters therefore share values of the axis. The ends of the axis have level 0, the middle has level 1, the quarters
-have level 2, and so on. To test an interval, the output inside it is predicted from the results at values whose level
-is below the higher of the levels of its two ends. The interval is halved if this prediction differs from the
-interpolation of all results by more than the tolerance.
+have level 2, and so on. An interval is tested as follows. Let n be the higher level of its two ends. The output in the
+interval is predicted from the results at all values with a level below n. The interval is halved if this prediction
+differs from the interpolation of all results by more than the tolerance.
 """
 
 from __future__ import annotations
@@ -286,7 +286,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     count = max(len(groups) - 1, 1)
     around = missed[:, 1:] - missed[:, :1]
     scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; zero for one realisation
-    # at one position, scatter alone exceeds the allowance for an output with a probability of at most 1 - CONFIDENCE
+    # at one position, the probability that scatter alone exceeds the allowance for any output is at most 1 - CONFIDENCE
     widely = ndtri(1 - (1 - CONFIDENCE) / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])

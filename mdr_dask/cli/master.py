@@ -72,7 +72,7 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print the factors, their errors and fitted laws.
 
-    SOURCE is a store, a table, or - for a table from standard input. A table has a row of names, and may have a row of
+    SOURCE is a store, a table, or '-' for a table from standard input. A table has a row of names, and may have one of
     units. The storage and loss modulus of a test are shifted together, unless --of names only one modulus.
 
     \b

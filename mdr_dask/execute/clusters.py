@@ -183,7 +183,7 @@ def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: 
 
 
 def _in_files(keys: Security, folder: Path) -> Security:
-    """Write TLS keys to files that batch jobs can read and other users cannot."""
+    """Write TLS keys to files in a folder that only this user and the batch jobs of this user can read."""
     names = [f"tls_{role}_{part}" for role in ("client", "scheduler", "worker") for part in ("cert", "key")]
     for name in ("tls_ca_file", *names):
         (folder / name).write_text(getattr(keys, name))

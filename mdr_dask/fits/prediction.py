@@ -17,7 +17,7 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.units import shown
 
-#: Largest number of modes of the common scatter (see `Predicted`); limits the time. Chosen by trial.
+#: Largest number of modes of the scatter that is common to all points; it limits the computing time. Chosen by trial.
 MODES = 6
 
 

@@ -69,7 +69,7 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _set_values(found: fit.Calibration, data: xr.Dataset) -> dict[str, FloatArray]:
-    """Return the measured conditions, with the value of the study instead of a measured value that belongs to it."""
+    """Return the measured conditions. A measured value that is near a value of the study is replaced by this value."""
     near = {name: belonging(each, data[name]) for name, each in found.measured.conditions.items()}
     return {name: np.where(np.isnan(each), found.measured.conditions[name], each) for name, each in near.items()}
 

@@ -254,7 +254,8 @@ def edges(centres: FloatArray, log: bool) -> FloatArray:
     """Return the edges of cells around the values of an axis: halfway between neighbouring values.
 
     If `log` is true, the edges are halfway between the logarithms of neighbouring values. The value at an end of the
-    axis is in the middle of its cell. The width of the cell of a single value is the absolute value, or 1 for 0.
+    axis is in the middle of its cell. If the axis has only one value, the width of its cell is the magnitude of the
+    value, or 1 if the value is 0.
     """
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)

@@ -85,7 +85,7 @@ class Columns:
 
     @property
     def known(self) -> list[str]:
-        """Names of the columns that messages suggest."""
+        """Names of the columns that error messages may suggest."""
         data = self.dataset
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 

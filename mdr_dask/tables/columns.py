@@ -111,8 +111,9 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[Meaning]:
     """Return the meaning of each column of the sheet.
 
     In a sheet without names, `columns` describes the columns of the sheet in order. If no name in the sheet means a
-    needed `Column`, a column with an unknown name is taken for it, provided that no other unknown column and no other
-    `Column` has the same dimension. A `Column` of pure numbers is never found in this way.
+    needed `Column`, a column with an unknown name is taken for this `Column` if its unit has the right dimension, and
+    if it is the only unknown column with this dimension. No other `Column` may have the same dimension. A `Column` of
+    pure numbers is never found in this way.
     """
     if not sheet.names:
         count = len(sheet.units)

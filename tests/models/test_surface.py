@@ -89,7 +89,7 @@ parameters:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("  points: 400\n", "  hurst: 0.8\n  rms_roughness: 1 um\n", "surface replaces hurst, rms_roughness"),
+        ("  points: 400\n", "  hurst: 0.8\n  rms_roughness: 1 um\n", "`surface` replaces `hurst` and `rms_roughness`"),
         ("  length: 20 mm\n", "", "expected `length`, the length of the rough line that represents the surface"),
         ("  surface: {spectrum: road.csv}\n", "", "expected length with rms_roughness, or length with surface"),
         ("surface: {spectrum: road.csv}", "profile: road.csv", "write surface: {profile: ...}"),

@@ -77,7 +77,7 @@ def operations(block: Block[FrettingWear]) -> float:
     if parameters.history:
         return 120.0 * parameters.cells**3 * size  # 12 n^2 operations in each of about 10 n steps, for n cells
     numbers, _ = reduce_block(block)
-    of_profiles = 1e4 * parameters.points  # integrals over about 20 pieces with 24 nodes
+    of_profiles = 1e4 * parameters.points  # integrals over about 20 pieces, with 24 nodes each
     total = 0.0
     for force in (False, True):
         held = np.asarray((block.column("hold") == "force") == force)

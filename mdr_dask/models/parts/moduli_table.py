@@ -221,7 +221,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
     """Return a text with the largest difference between the shift factors of the curves and of `law`.
 
-    If `law` does not apply at all temperatures, the text gives the reason. Without a law, the text is empty.
+    If there is a temperature at which `law` does not apply, the text gives the reason. Without a law, it is empty.
     """
     if law is None:
         return ""

@@ -96,7 +96,8 @@ class SlidingBody(Parameters):
             if self.hurst is None:
                 raise ValueError("expected `hurst`, because generated roughness needs a Hurst exponent, got none")
         elif both:
-            raise ValueError(f"surface replaces {', '.join(both)}: leave out surface, or {', '.join(both)}")
+            names = " and ".join(f"`{name}`" for name in both)
+            raise ValueError(f"`surface` replaces {names}: leave out either `surface` or {names}")
         elif self.surface.profile is not None and self.length is not None:
             raise ValueError(
                 "leave out `length`, because the file of `surface: {profile: ...}` determines the length of the line"

@@ -112,7 +112,7 @@ def _checked(
     outputs: Sequence[str],
     places: FloatArray,
 ) -> list[Checked]:
-    """Return every contact from the coarsest level on which all outputs meet the accuracy.
+    """Return each contact from the coarsest level on which all its outputs meet the accuracy.
 
     A contact that does not meet the accuracy on any level is taken from the finest level with a solution. If a contact
     has no solution on any level, NotConvergedError is raised.

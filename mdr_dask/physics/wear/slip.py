@@ -108,7 +108,8 @@ class PartialSlip:
     If the border passes a radius when the depth is d1, the image there is g = d1 - eta from then on. At the depth d,
     f_star is the profile of an image that equals g up to b, and d - eta beyond b (the plateau). While the plateau rises
     by dd, f_star rises by (2/pi) arccos(b / r) dd. Therefore only the path (b, d) is stored. At constant depth, the
-    border b stays at c. Under constant force, the border moves outwards until the image has a jump at the border.
+    border b stays at the stick radius c of the virgin contact. Under constant force, the border moves outwards until
+    the image has a jump at the border.
 
     The unknowns are y = 1 - (d - g) / eta at all nodes except the last node (where y = 1), and the width of the slip
     zone. Under constant force, the depth is a further unknown. As long as the border moves, the last unknown is the

@@ -66,7 +66,7 @@ class Worn:
         return np.asarray(found(places)) if name in FUNCTIONS else float(found)
 
     def known_error(self, name: str) -> float:
-        """Return the relative error of an attribute that solutions of different resolution may have in common."""
+        """Return the known relative error of an attribute. A comparison of resolutions may not reveal this error."""
         is_radius = name in ("contact_radius", "stick_border") and getattr(self, name) > 0.0
         return self.relative_error + (self.radius_error / float(getattr(self, name)) if is_radius else 0.0)
 
