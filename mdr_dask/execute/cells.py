@@ -52,7 +52,7 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger to find the results that the round still has to compute.
 
-    `asked` marks the cases of the stage. `needed` marks the cases that need the realisations of the round. These
+    `asked` marks the cases whose results are computed or marked as not needed. `needed` marks the cases that need the realisations of the round. These
     realisations are ``realisations[0]`` to ``realisations[1] - 1``. The round also computes earlier realisations of the
     needed cases that have the state "not needed" in the ledger. If `retry_failed` is true, results of the round that
     failed or did not converge are computed again. `own` marks the results that belong to this part of the campaign;

@@ -87,7 +87,8 @@ def outlook(campaign: Campaign, url: str) -> Progress:
 class _Round:
     # Shape, chunks and coordinates of every group of the store.
     layout: tuple[Template, ...]
-    # Masks for each group. `asked`: cases of the stage. `needed`: cases that need the realisations of this round.
+    # Masks for each group. `asked`: cases whose results the round computes or marks as not needed. `needed`: cases that
+    # need the realisations of this round.
     asked: list[BoolArray]
     needed: list[BoolArray]
     # Index of the first realisation of the round, and the index that follows its last realisation.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: Largest number of rows computed together. Chosen by trial: larger tables take more memory and are no faster.
+#: Largest number of rows computed together. Chosen by trial: more rows at a time take more memory and are no faster.
 ROWS = 2**16
 
 

@@ -61,8 +61,9 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
 
 def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a copy for netCDF. Attributes that are neither texts nor numbers are JSON texts in the copy.
+    """Return a copy of a dataset that can be saved as netCDF, or as a Zarr store that no run can extend.
 
+    Attributes that are neither texts nor numbers are JSON texts in the copy.
     Attributes that are None, and the version of the layout, are left out.
     """
     plain = dataset.copy()

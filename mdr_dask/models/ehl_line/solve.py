@@ -31,8 +31,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Estimate
 
-#: Floors of outputs (see `solve_film`). The spike position is stored as x/a. With the floor 1, its error is divided by
-#: the half width a if the spike lies inside the contact.
+#: Floors of outputs (see `solve_film`). The output is x/a, where a is the half width. Inside the contact, the accuracy
+#: is therefore the allowed error of x, divided by a.
 _FLOORS = {"spike_position": 1.0}
 
 

@@ -79,7 +79,7 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
     if any(abs(step - steps[0]) > AGREE * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
         raise DataError(
-            f"more than one {name} of positions, and their steps differ ({apart}): delete all but one {name}"
+            f"more than one {name} of positions, and their steps differ ({apart}): keep only one {name} of positions"
         )
     return steps[0] if steps else None
 

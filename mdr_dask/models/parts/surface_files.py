@@ -45,7 +45,7 @@ class Found(NamedTuple):
     """The spectrum C2D of a surface, limited to the wave numbers in its file.
 
     `resolution` is the wavelength in m below which there is only noise, or 0 if no noise was found. `error` contains
-    the standard errors of log C2D if C2D was computed from the spectrum of straight profiles, and is None otherwise.
+    the standard errors of log C2D if C2D was fitted to the spectrum of a scan, and is None otherwise.
     """
 
     spectrum: Spectrum

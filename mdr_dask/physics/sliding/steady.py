@@ -33,7 +33,9 @@ from mdr_dask.physics.sliding.kelvin import (
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
-LOST = 1e-13  # a smaller rise, relative to the heights, has rounding errors above 0.2 % (see `_is_lost`)
+# If the line rises by less than this fraction of its heights from the begin of contact to its highest point, rounding
+# errors of this rise exceed 0.2 % (see `_is_lost`).
+LOST = 1e-13
 # A lattice depth is a depth with this number of significant binary digits. The search tries lattice depths only. The
 # relative errors of contact fraction and contact slope are then about 2^-20, below every accuracy that a user needs.
 LATTICE_BITS = 20

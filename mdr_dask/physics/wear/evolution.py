@@ -101,9 +101,10 @@ def at(problem: Problem, history: Sequence[Any], time: float) -> Any:
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Any], time: float) -> tuple[Any, float]:
-    """Take one time step with the BDF formula of the highest possible order. Return the contact and the error.
+    """Take one time step with the BDF formula of the highest possible order.
 
-    The order is the number of past contacts, but at most 3. If the step fails, None is returned instead of the contact,
+    Return the contact at the end of the step, and the estimated error of ``problem.worn`` in this step. The order is
+    the number of past contacts, but at most 3. If the step fails, None is returned instead of the contact,
     and the error is infinite.
     """
     past = list(history[-1:-4:-1])
