@@ -52,11 +52,11 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger to find the results that the round still has to compute.
 
-    `asked` marks the cases whose results are computed or marked as not needed. `needed` marks the cases that need the realisations of the round. These
-    realisations are ``realisations[0]`` to ``realisations[1] - 1``. The round also computes earlier realisations of the
-    needed cases that have the state "not needed" in the ledger. If `retry_failed` is true, results of the round that
-    failed or did not converge are computed again. `own` marks the results that belong to this part of the campaign;
-    None means all results.
+    `asked` marks the cases whose results are computed or marked as not needed. `needed` marks the cases that need the
+    realisations of the round. These realisations are ``realisations[0]`` to ``realisations[1] - 1``. The round also
+    computes earlier realisations of the needed cases that have the state "not needed" in the ledger. If `retry_failed`
+    is true, results of the round that failed or did not converge are computed again. `own` marks the results that
+    belong to this part of the campaign; None means all results.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
