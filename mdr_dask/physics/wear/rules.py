@@ -3,8 +3,8 @@
 In the fast rule (thesis eq. 6.11), the image g depends on the number of cycles N through `rest` = exp(-xi N / a(c)),
 where a(c) is the scar radius of the limiting profile. From the stick radius c to x = 1, y = (g - g0(c)) / (1 - g0(c))
 follows a logistic law, where g0 is the virgin image. Beyond the virgin contact radius x = 1, g - 1 = `rest` (g0 - 1).
-In the limiting profile (eqs. 6.8-6.10), `rest` is zero. For a `Profile`, a ValueError is raised if the stick radius does not lie between 0 and 1, or if the scar
-reaches beyond the table of the profile.
+In the limiting profile (eqs. 6.8-6.10), `rest` is zero. For a `Profile`, a ValueError is raised if the stick radius
+does not lie between 0 and 1, or if the scar reaches beyond the table of the profile.
 """
 
 from __future__ import annotations
