@@ -71,7 +71,10 @@ def test_the_command_lists_what_it_finds_and_mends_it(toy, url, capsys):
     assert main(["status", url]) == 2
     assert "height/c/0/1 is missing" in capsys.readouterr().err
     assert main(["verify", url, "--repair"]) == 1
-    assert "notes.txt" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "notes.txt" in printed.err
+    assert "removed blocks: 1" in printed.out
+    assert "--repair" not in printed.out
     Path(url, "notes.txt").unlink()
     assert main(["verify", url]) == 0
     assert run(small(toy), url).done == 4

@@ -45,7 +45,7 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     if form == "json":
         print_json(_document(found) | ({"left": _document(left)["findings"]} if left else {}))
     else:
-        _print(store, found, limit)
+        _print(store, found, limit, repaired=left is not None)
     if left is None:
         return 1 if found.findings else 0
     for finding in left.findings:
@@ -53,7 +53,7 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     return 1 if left.findings else 0
 
 
-def _print(store: str, found: Inspection, limit: int) -> None:
+def _print(store: str, found: Inspection, limit: int, *, repaired: bool) -> None:
     rows = [{"kind": f.kind, "file": printable(f.name), "what": printable(f.what)} for f in found.findings]
     if rows:
         print_rows(rows, {}, "table", limit)
@@ -62,7 +62,8 @@ def _print(store: str, found: Inspection, limit: int) -> None:
     bad = sum(len(group.bad_blocks) for group in found.groups)
     click.echo(f"{store}: {found.files} files, {found.blocks} blocks: {len(rows) or 'no'} faults")
     if bad:
-        click.echo(f"{bad} blocks are damaged; --repair removes them, and the next run computes them again")
+        what = f"removed blocks: {bad}" if repaired else f"damaged blocks: {bad}; --repair removes them"
+        click.echo(f"{what}; the next run computes them again")
 
 
 def _document(found: Inspection) -> dict[str, object]:
