@@ -334,7 +334,7 @@ def units(parameters: FrettingWear) -> dict[str, str]:
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
-    version=15,
+    version=16,
     summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
     parameters=FrettingWear,
     outputs=OUTPUTS,

@@ -47,7 +47,7 @@ SOLVE = "mdr_dask.models.sliding_friction.solve"
 
 MODEL = Model(
     name="sliding_friction",
-    version=19,
+    version=20,
     summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
     parameters=SlidingFriction,
     outputs=OUTPUTS,

@@ -142,7 +142,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=20,
+    version=21,
     summary="friction after a jump of the sliding velocity, or during a history of velocity and load",
     parameters=VelocityJump,
     outputs=OUTPUTS,
