@@ -1,6 +1,6 @@
 """The exceptions of mdr_dask, and hints for messages.
 
-Workers pickle exceptions, so exceptions take positional arguments only.
+Exceptions take positional arguments only, because workers send them as pickles.
 """
 
 from __future__ import annotations

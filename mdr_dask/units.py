@@ -250,7 +250,7 @@ def example_unit(unit: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a known unit, perhaps after a factor, as in ``10^3 um^3``.
+    """Return whether a text is a known unit. A factor before the unit is allowed, as in ``10^3 um^3``.
 
     An empty text counts as the unit of pure numbers.
     """

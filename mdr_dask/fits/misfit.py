@@ -67,7 +67,7 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that a trend of the residuals is due to chance, and the condition with the clearest trend.
+    """Return the probability that chance causes the clearest trend of the residuals, and the condition of this trend.
 
     For each condition, a parabola is fitted to the residuals against the rank of the condition's value.
     The smallest probability is multiplied by the number of conditions, because every condition is another chance to

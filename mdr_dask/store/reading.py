@@ -76,7 +76,7 @@ def with_plain_attributes(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``. Lazy arrays are written piece by piece.
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``. Dask arrays are computed and written chunk by chunk.
 
     An existing file is replaced. Raise StoreError if the packages for netCDF are not installed.
     """

@@ -24,6 +24,7 @@ OPERATIONS_A_POINT = 10  # operations of a solution for each point of the line, 
 #: of Prony terms plus 1. The three coarsest grids have 1, 2 and 4 nodes per point, together 7. About five sweeps over
 #: each grid need n operations for each node, together 35 n. On each grid there is about one contact or free recovery
 #: for every four points, which needs about 15 matrix products of 3 n^2 operations for Newton's method, together 34 n^2.
+#: The numbers of sweeps, products and contacts were counted in one case.
 OPERATIONS_OF_GENERAL = 35
 
 #: Outputs that have errors, each with the corresponding column of `Steady`.

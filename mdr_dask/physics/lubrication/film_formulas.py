@@ -151,7 +151,7 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. This factor converts ``H = h R/a^2`` to ``h/R``."""
+    """Return ``(a/R)^2 = 8 W/pi``, where a is the half width of the dry contact. The film is ``h/R = H (a/R)^2``."""
     return 8 * W / np.pi
 
 

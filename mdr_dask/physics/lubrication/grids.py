@@ -39,7 +39,7 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the positions with `wanted` cells upstream.
+    """Return the positions that have the numbers of cells `wanted` upstream.
 
     If there are fewer cells, the density is constant from the last but one of the `positions` on.
     """

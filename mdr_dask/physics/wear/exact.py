@@ -29,7 +29,7 @@ from mdr_dask.physics.wear.worn import (
     worn_volume,
 )
 
-COARSEST = 1.6e-2  # largest `accuracy`, chosen by trial: coarser panels do not resolve steep bodies
+COARSEST = 1.6e-2  # largest `accuracy`, with two nodes in a panel (see `Resolution.order`); chosen by trial
 #: If N / sqrt(a^2 - c^2) reaches this value, where a is an upper bound of the contact radius, the limiting profile is
 #: returned. The difference from the limiting profile falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), and is
 #: then below the rounding error.
